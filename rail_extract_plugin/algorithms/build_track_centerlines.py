@@ -80,9 +80,9 @@ class BuildTrackCenterlines(RailAlgorithm):
     ) -> dict[str, Any]:
         """Pair the rails of each class, then write the centerlines."""
         from ...core.checks.lines import with_tracks
+        from ...core.fields import CENTERLINES, RAILS
         from ...core.output.layers import lines_layer
-        from ...core.products import CENTERLINES, RAILS
-        from ...core.steps import tracks_of
+        from ...core.tracks.centerlines import tracks_of
         from ..reading.line_layers import read_rails
 
         values = ParameterValues(self, parameters, context)

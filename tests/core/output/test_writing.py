@@ -10,12 +10,11 @@ shapely = pytest.importorskip("shapely")
 
 from rail_extract.core.disk import Destination  # noqa: E402
 from rail_extract.core.errors import DiskError  # noqa: E402
-from rail_extract.core.fields import CENTERLINE_FIELDS, QUALITY_FIELDS, RAIL_FIELDS  # noqa: E402
+from rail_extract.core.fields import CENTERLINE_FIELDS, CENTERLINES, QUALITY_FIELDS, RAIL_FIELDS, RAILS  # noqa: E402  # noqa: E402
 from rail_extract.core.frame import LocalFrame  # noqa: E402
 from rail_extract.core.output.geopackage import tables_in  # noqa: E402
 from rail_extract.core.output.layers import lines_layer, quality_layer  # noqa: E402
 from rail_extract.core.output.writing import write_layers  # noqa: E402
-from rail_extract.core.products import CENTERLINES, RAILS  # noqa: E402
 from rail_extract.core.rails import Centerline, RailLine, TrackGeometry  # noqa: E402
 
 FRAME = LocalFrame(np.array([500.0, 7100.0, 30.0]), 0.5, 0.25, "EPSG:2227")
@@ -104,15 +103,3 @@ def test_the_other_tables_of_a_file_stay(tmp_path):
     assert counts == {"signals": 3, "rails": 1, "quality": 2}
     assert tables_in(path) == set(counts)
     assert [file.name for file in tmp_path.iterdir()] == ["all.gpkg"]
-
-
-def test_layers_for_other_programs_are_those_of_their_suffix(tmp_path):
-    frame = LocalFrame(np.array([1000.0, 2000.0, 0.0]), crs_wkt="EPSG:32643")
-    rail = RailLine(np.array([[0.0, 0.0, 5.0], [3.0, 4.0, 5.5]]), 1, 10, 9, 1.0, 0.5, 0.0)
-    for name in ("rails.dxf", "rails.csv", "rails_points.csv"):
-        write_layers([lines_layer(RAILS, [rail])], Destination.at(tmp_path / name), frame)
-    assert "RAILS_10" in (tmp_path / "rails.dxf").read_text(encoding="ascii")
-    assert (
-        "LINESTRING Z (1000.0000 2000.0000 5.0000,1003.0000 2004.0000 5.5000)" in (tmp_path / "rails.csv").read_text()
-    )
-    assert (tmp_path / "rails_points.csv").read_text().splitlines()[-1] == "1,10,1003.0000,2004.0000,5.5000,5.000"
