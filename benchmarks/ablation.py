@@ -134,21 +134,18 @@ SWITCHES = (
     _rule("classify.partner._majority", first),
     _rule("classify.labels.MIN_AXES", 1),
     _rule("classify.tops._around", first),
-    _rule("heads.refinement._crossings", first),
     _rule("heads.branch_starts._points_of_arc", lambda *_: np.zeros(2)),
     _rule("heads.branch_starts.HEEL_SPREAD_M", np.inf),
-    _rule("heads.branch_starts.SWITCH_M", 0.001),
     _rule("heads.head_points.CROSSED_M", np.inf),
+    _rule("heads.own_level.DRIFT", 0.0),
+    _rule("heads.roads.CLEARLY_M", 0.0),
     _rule("heads.axis.SHOWN_SHARE", 0.0),
     _rule("heads.axis._either_end", lambda points: np.zeros(len(points.stations))),
     _rule("heads.axis.hidden_edges", lambda points: np.zeros(points.free.shape, dtype=bool)),
     _rule("heads.edges._excess", np.zeros_like),
     _rule("heads.sections._pull", lambda station, is_left, count: np.zeros(count)),
     _rule("heads.sections._half_apart", lambda *_: 0.0),
-    _rule("heads.level.OTHER_RAIL_M", np.inf),
-    _rule("heads.own_level.DRIFT", 0.0),
     _rule("heads.own_level.SHIFTED_M", 0.0),
-    _rule("heads.own_level.SKIPPED_BINS", 1),
 )
 
 

@@ -80,7 +80,7 @@ class FrpdfCleanup(RailAlgorithm):
         """Clean each band, then write the file."""
         from ...core.frpdf.cleanup import clean
         from ...core.frpdf.engine import make_engine
-        from ...core.frpdf.models import load_arrays
+        from ...core.frpdf.weights import load_arrays
         from ..reading.geotiff import read_rasters
 
         values = ParameterValues(self, parameters, context)
