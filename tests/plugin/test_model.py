@@ -50,16 +50,6 @@ def test_model_is_valid_and_has_the_parameters_of_extract_rails(model, algorithm
         assert model.parameterDefinition(name).defaultValue() == algorithm.parameterDefinition(name).defaultValue()
 
 
-def test_model_designer_opens_it(model):
-    from processing.modeler.ModelerDialog import ModelerDialog
-
-    dialog = ModelerDialog()
-    dialog.loadModel(str(MODEL))
-    assert dialog.model().childAlgorithms().keys() == model.childAlgorithms().keys()
-    dialog.setDirty(False)
-    dialog.close()
-
-
 def test_context_menu_of_extract_rails_opens_a_copy(qgis, plugin, model):
     from processing.gui.ProviderActions import ProviderContextMenuActions
 

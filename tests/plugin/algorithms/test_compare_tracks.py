@@ -123,13 +123,6 @@ def test_missing_and_extra_lines_have_points(compare):
     assert set(values["across_mm"][values["state"] != "both"]) == {None}
 
 
-def test_feet_give_the_same_millimetres(compare):
-    unit_m = 1200 / 3937
-    one, other = (layer([arc(left)], crs="EPSG:2227", unit_m=unit_m) for left in (0.0, 0.01))
-    results, _, _ = compare(one, other)
-    assert results["ACROSS_RMS"] == pytest.approx(10, abs=0.05)
-
-
 def test_lines_without_heights(compare):
     results, values, _ = compare(layer([arc()], kind="LineString"), layer([arc(0.01)], kind="LineString"))
     assert results["ACROSS_RMS"] == pytest.approx(10, abs=0.05)

@@ -215,17 +215,6 @@ def test_findings_are_the_table_of_the_report(run, write_cloud, track, tmp_path)
         assert finding["reason"] in row
 
 
-def test_a_single_rail_is_not_a_track_and_the_report_says_so(run, write_cloud, track, outputs, tmp_path):
-    points = track()
-    more = {"QUALITY": tmp_path / "quality.gpkg", "REPORT": tmp_path / "report.html"}
-    outcome = run({"INPUT": write_cloud(points[points[:, 1] < 3_000_000]), "ITERATIONS": 1, **outputs, **more})
-    assert outcome.ok, outcome.error
-    assert (outcome.results["RAIL_COUNT"], outcome.results["CENTERLINE_COUNT"]) == (1, 0)
-    assert (outcome.results["STATION_COUNT"], outcome.results["BRIDGED_LENGTH"]) == (0, 0)
-    assert lines_of(more["QUALITY"])[1] == []
-    assert "No track was found." in more["REPORT"].read_text(encoding="utf-8")
-
-
 def test_strips_are_stated_and_aligned(run, write_cloud, track, tmp_path, new_feedback):
     points = np.concatenate([track(length_m=20.0)] * 2)
     strips = np.repeat([7, 9], len(points) // 2)

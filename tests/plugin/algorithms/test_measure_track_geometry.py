@@ -73,22 +73,6 @@ def test_points_have_the_fields_of_the_interface_and_the_values_of_the_track(mea
     np.testing.assert_allclose([first.x(), first.y(), first.z()], middle[0], atol=1e-6)
 
 
-def test_signs_follow_the_direction_of_the_centerline(measure):
-    middle, left, right = curved_track()
-    _, _, values = measure(layer_of(middle[::-1]), layer_of(left, right[::-1]))
-    np.testing.assert_allclose(values["cant_mm"], CANT_MM, atol=0.01)
-    np.testing.assert_allclose(values["radius_m"], -RADIUS_M, rtol=0.002)
-    np.testing.assert_allclose(values["grade_pm"], -4.0, atol=0.01)
-
-
-@pytest.mark.parametrize(("radius_m", "known"), [(9_000.0, True), (12_000.0, False)])
-def test_radius_is_empty_above_ten_kilometres(measure, radius_m, known):
-    middle, left, right = curved_track(radius_m=radius_m)
-    _, _, values = measure(layer_of(middle), layer_of(left, right))
-    assert np.isfinite(values["radius_m"]).all() == known
-    assert np.isfinite(values["radius_m"]).any() == known
-
-
 def test_feet_give_the_same_millimetres(measure):
     lines = curved_track(unit_m=1200 / 3937)
     _, layer, values = measure(layer_of(*lines[:1], crs="EPSG:2227"), layer_of(*lines[1:], crs="EPSG:2227"))

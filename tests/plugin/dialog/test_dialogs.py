@@ -4,9 +4,8 @@ import re
 from pathlib import Path
 
 import pytest
-from dialog_pictures import HELP_SHARE, SIZES, dialog_pictures
+from dialog_pictures import HELP_SHARE, SIZES
 from qgis.PyQt.QtCore import QUrl
-from qgis.PyQt.QtGui import QImage
 from qgis.PyQt.QtWidgets import QGroupBox, QLabel, QScrollArea, QSplitter, QTextBrowser
 from rail_extract.rail_extract_plugin.algorithms import ALGORITHMS
 from rail_extract.rail_extract_plugin.dialog import guide
@@ -177,14 +176,3 @@ def test_several_choices_are_one_entry_of_a_list(open_dialog):
     for given, value in {"OVERLAP,SYNTHETIC": ["OVERLAP", "SYNTHETIC"], "SYNTHETIC": ["SYNTHETIC"], "": []}.items():
         wrapper.setValue(given)
         assert wrapper.value() == value
-
-
-def test_pictures_of_the_dialogs(plugin, tmp_path):
-    pictures = dialog_pictures(tmp_path / "dialogs", {"extractrails": {"INPUT": "sample.laz"}})
-    assert {path.stem for path in pictures} == {f"{name}_{size}" for name in NAMES for size in (*SIZES, "all")}
-    for path in pictures:
-        image = QImage(str(path))
-        size = path.stem.split("_")[1]
-        width, height = SIZES.get(size, SIZES["wide"])
-        assert image.width() == width
-        assert image.height() >= height

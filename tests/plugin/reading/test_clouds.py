@@ -19,10 +19,10 @@ def layer(path):
     return layer
 
 
-@pytest.mark.parametrize("form", [str, QgsProperty.fromValue, lambda path: path.parent])
-def test_a_file_or_a_folder_is_left_to_the_core(path, context, form):
-    given = form(path if form is not QgsProperty.fromValue else str(path))
-    assert cloud_source(given, context) == CloudSource((path.parent if given == path.parent else path,))
+def test_a_file_or_a_folder_is_left_to_the_core(path, context):
+    for place in (path, path.parent):
+        for given in (str(place), QgsProperty.fromValue(str(place))):
+            assert cloud_source(given, context) == CloudSource((place,))
 
 
 def test_layer_has_its_coordinate_system(path, layer, context):

@@ -93,11 +93,3 @@ def test_toolbox_loads_without_any_package(reasons_without):
     assert set(reasons) == {algorithm.NAME for algorithm in ALGORITHMS}
     assert {name for name, reason in reasons.items() if not reason} == {"installpackages", "checkinstallation"}
     assert "numpy, scipy, laspy, lazrs, cv2, pyproj" in reasons["extractrails"]
-
-
-def test_message_lists_algorithms_that_work_without_laspy(reasons_without):
-    reasons = reasons_without("laspy", "lazrs")
-    assert "Python packages laspy, lazrs, which" in reasons["extractrails"]
-    assert "Clean rail raster (FRPDF)" in reasons["extractrails"]
-    assert not reasons["frpdfcleanup"]
-    assert not reasons["buildtrackcenterlines"]

@@ -207,7 +207,9 @@ def test_map_tips_say_what_is_under_the_mouse(styled, style, values, tip):
 def test_labels(styled, style, values, label):
     layer = styled(style, [values])
     assert layer.labelsEnabled()
-    assert said(layer, f"[% {layer.labeling().settings().getLabelExpression().expression()} %]") == label
+    settings = layer.labeling().settings()
+    expression = settings.fieldName if settings.isExpression else f'"{settings.fieldName}"'
+    assert said(layer, f"[% {expression} %]") == label
 
 
 def test_the_review_is_chosen_from_a_list(styled):
