@@ -8,27 +8,31 @@ import shlex
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from types import ModuleType
 
 PROGRAM = "python -m rail_extract"
 
+LINES, POINTS = "core.commands.lines", "core.commands.points"
+
 COMMANDS = {
-    "extract": ("core.commands.extract", "extract rails and track centerlines on several cores or computers"),
-    "classify": ("core.commands.classify", "find the rail points of raw clouds and write classified copies"),
-    "grow": ("core.commands.grow", "follow rails from seeds and write classified copies of the clouds"),
-    "airborne": ("core.commands.airborne", "fit track centerlines in airborne clouds along guides"),
-    "fit": ("core.commands.fit", "fit design elements to track centerlines"),
-    "export-alignment": ("core.commands.export_alignment", "write design elements as LandXML, IFC or DXF"),
-    "import-alignment": ("core.commands.import_alignment", "read LandXML as elements and axes; compare tracks with it"),
-    "compare": ("core.commands.compare", "compare the lines of two surveys, or of a survey and a design"),
-    "stations": ("core.commands.stations", "give features their kilometre along an axis"),
-    "train-classifier": ("core.commands.train_classifier", "train a classifier of rail points on labelled clouds"),
-    "onnx": ("core.frpdf.onnx", "write the network for other runtimes"),
-    "train": ("laboratory.training.train", "train the network on synthetic rasters"),
-    "evaluate": ("laboratory.training.evaluate", "compare weights on a fixed set of synthetic rasters"),
-    "scenes": ("laboratory.scenes.write", "write synthetic clouds with their true lines"),
+    "extract": ("core.commands.extract.extract", "extract rails and track centerlines on several cores or computers"),
+    "classify": (f"{POINTS}.classify", "find the rail points of raw clouds and write classified copies"),
+    "grow": (f"{POINTS}.grow", "follow rails from seeds and write classified copies of the clouds"),
+    "airborne": ("core.commands.airborne.airborne", "fit track centerlines in airborne clouds along guides"),
+    "fit": (f"{LINES}.fit", "fit design elements to track centerlines"),
+    "export-alignment": (f"{LINES}.export_alignment", "write design elements as LandXML, IFC or DXF"),
+    "import-alignment": (f"{LINES}.import_alignment", "read LandXML as elements and axes; compare tracks with it"),
+    "compare": (f"{LINES}.compare", "compare the lines of two surveys, or of a survey and a design"),
+    "stations": (f"{LINES}.stations", "give features their kilometre along an axis"),
+    "train-classifier": (f"{POINTS}.train_classifier", "train a classifier of rail points on labelled clouds"),
+    "onnx": ("core.frpdf.onnx.add_arguments", "write the network for other runtimes"),
+    "train": ("laboratory.training.train.add_arguments", "train the network on synthetic rasters"),
+    "evaluate": ("laboratory.training.evaluate.add_arguments", "compare weights on a fixed set of synthetic rasters"),
+    "scenes": ("laboratory.scenes.write.add_arguments", "write synthetic clouds with their true lines"),
 }
-"""Module and help of each command; a module has `add_arguments(parser)` and `run(args)`, which may return a code."""
+"""Function and help of each command; the function declares the arguments, and as `run` what runs with them.
+
+`run(args)` may return an exit code, and raises a `RailExtractError` where something is wrong.
+"""
 
 
 INTERRUPTED = 130
@@ -42,12 +46,11 @@ NO_MEMORY = "Not enough memory: choose a smaller extent."
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command and return its exit code; only the module of this command is imported."""
-    module, args = parse(sys.argv[1:] if arguments is None else list(arguments))
-    return _run(module, args)
+    return _run(parse(sys.argv[1:] if arguments is None else list(arguments)))
 
 
-def parse(arguments: list[str]) -> tuple[ModuleType, argparse.Namespace]:
-    """Return the module of a command and its arguments; ends the program if there are others, or help is asked for."""
+def parse(arguments: list[str]) -> argparse.Namespace:
+    """Return the arguments of a command; ends the program if there are others, or help is asked for."""
     parser = argparse.ArgumentParser(prog=PROGRAM, description=__doc__)
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
     listed = {name: command for name, command in COMMANDS.items() if _is_installed(command[0])}
@@ -59,26 +62,26 @@ def parse(arguments: list[str]) -> tuple[ModuleType, argparse.Namespace]:
     if chosen is None:
         parser.parse_args(arguments)
         parser.exit()
-    module = importlib.import_module(f".{listed[chosen][0]}", __package__)
-    module.add_arguments(parsers[chosen])
+    module, _, declare = listed[chosen][0].rpartition(".")
+    getattr(importlib.import_module(f".{module}", __package__), declare)(parsers[chosen])
     try:
         args = parser.parse_args(arguments)
     except (UnicodeDecodeError, RecursionError):
         parsers[chosen].error("a file that is given as @FILE is not text, or names itself")
     args.command_line = shlex.join([*PROGRAM.split(), *arguments])
-    return module, args
+    return args
 
 
-def _is_installed(module: str) -> bool:
+def _is_installed(path: str) -> bool:
     """Return whether the package of a command exists: the plugin's zip does not include the laboratory."""
-    return Path(__file__).with_name(module.split(".")[0]).is_dir()
+    return Path(__file__).with_name(path.split(".")[0]).is_dir()
 
 
-def _run(module: ModuleType, args: argparse.Namespace) -> int:
+def _run(args: argparse.Namespace) -> int:
     errors, kernels = (importlib.import_module(f".core.{name}", __package__) for name in ("errors", "kernels"))
     try:
         with kernels.one_thread(*kernels.blas()):
-            return module.run(args) or 0
+            return args.run(args) or 0
     except errors.RailExtractError as error:
         print(error, file=sys.stderr)
         return 1

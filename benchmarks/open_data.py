@@ -16,12 +16,12 @@ from itertools import combinations, groupby
 from pathlib import Path
 
 import numpy as np
+from rail_extract.core.checks.gauge_estimate import measure_spacings
 from rail_extract.core.classify.settings import Settings
 from rail_extract.core.clouds.las import laspy
 from rail_extract.core.clouds.points import RailPoints
 from rail_extract.core.errors import ParameterError, RailExtractError
 from rail_extract.core.frame import LocalFrame
-from rail_extract.core.heads.gauge_estimate import measure_spacings
 from rail_extract.core.learned.model import SHIPPED
 from rail_extract.core.parameters import Parameters
 from rail_extract.core.pipeline import extract_rails

@@ -36,8 +36,8 @@ from rail_extract.core.rails import RailLine, Support
 from rail_extract.core.squares.grid import HALO_M, Square
 from rail_extract.core.squares.pieces import SquareRails, trim
 from rail_extract.core.squares.spool import SpooledPoints, spool
+from rail_extract.core.squares.steps import engine_for, square_side
 from rail_extract.core.standards import STANDARDS
-from rail_extract.core.steps import engine_for, square_side
 from rail_extract.core.tasks import Context, Name, Once, Results, Runner, Task, turns
 from rail_extract.core.workers import runner as processes
 from rail_extract.laboratory.curves import Element, trace

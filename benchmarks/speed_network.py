@@ -13,11 +13,10 @@ import numpy as np
 import torch
 from rail_extract.core.clouds.points import RailPoints
 from rail_extract.core.frpdf import START
-from rail_extract.core.frpdf.architecture import BASE
+from rail_extract.core.frpdf.architecture import BASE, architecture_of, fold
 from rail_extract.core.frpdf.cleanup import clean
 from rail_extract.core.frpdf.corridor import Piece, lay_fields
 from rail_extract.core.frpdf.engine import Engine
-from rail_extract.core.frpdf.folding import architecture_of, fold
 from rail_extract.core.frpdf.network import FRPDF, set_weights
 from rail_extract.core.frpdf.onnx import to_onnx
 from rail_extract.core.frpdf.opencv_engine import OpenCvEngine
@@ -26,7 +25,7 @@ from rail_extract.core.pipeline import Parameters
 from rail_extract.core.progress import SILENT
 from rail_extract.core.rails import RailLine
 from rail_extract.core.raster import RailRaster, cell_size, rasterize
-from rail_extract.core.steps import lines_of
+from rail_extract.core.squares.steps import lines_of
 from rail_extract.laboratory.ruler.lines import match
 
 TILE = 512

@@ -170,8 +170,10 @@ class Destination:
         """Move the files of a temporary folder to their names, if the old file is still the one that was copied."""
         new = sorted((folder / NEW).iterdir())
         for file in filter(Path.is_file, new):
-            _flush(file)
-            _keep_rights(file, self.file.with_name(file.name), self.file)
+            with file.open("r+b") as opened:
+                os.fsync(opened.fileno())  # otherwise it may be empty after a power cut, although it was renamed
+            for model in filter(Path.exists, (self.file, self.file.with_name(file.name))):
+                shutil.copymode(model, file)  # so that nobody else can read it
         with alone_in(self.file.parent):
             try:
                 is_other = identity(self.file) not in (None, self.before)
@@ -189,14 +191,9 @@ class Destination:
 
 
 def replace_folder(scratch: Path, target: Path) -> None:
-    """Move a new folder to its name; if the run is killed in between, the next one that writes there completes it.
+    """Move a new folder, in the folder `NEW` of a temporary one, to its name next to it, where an old one may be.
 
-    Parameters
-    ----------
-    scratch : Path
-        Temporary folder next to the target, with the new folder in the folder `NEW`.
-    target : Path
-        Folder that may exist.
+    If the run is killed in between, the next one that writes there completes it.
 
     Raises
     ------
@@ -259,33 +256,12 @@ def _reason(error: OSError | ValueError) -> str:
     return getattr(error, "strerror", None) or str(error)
 
 
-def _keep_rights(file: Path, old: Path, main: Path) -> None:
-    """Give a new file the access rights of the one it replaces, so that nobody else can read it."""
-    for model in (old, main):
-        if model.exists():
-            shutil.copymode(model, file)
-            return
-
-
-def _flush(file: Path) -> None:
-    """Wait until a file is on the disk: otherwise it may be empty after a power cut, although it was renamed."""
-    with file.open("r+b") as opened:
-        os.fsync(opened.fileno())
-
-
 def _swap(folder: Path, main: Path, names: Sequence[Path]) -> None:
-    """Replace files by the new ones from a temporary folder, and remove companions of the old file.
+    """Replace files by the new ones from a temporary folder, and remove companions of the old main file.
 
-    If there are several new files, the main one is missing from the first move to the last: a set that is not complete
-    cannot be opened.
-
-    Parameters
-    ----------
-    folder : Path
-    main : Path
-        Final name of the file that opens the set, or of the only file.
-    names : sequence of Path
-        Final names of all new files. Those that are no longer in the temporary folder have been moved already.
+    If there are several new files, the main one, which opens the set, is missing from the first move to the last: a set
+    that is not complete cannot be opened. Files of `names` that are no longer in the temporary folder have been moved
+    already.
 
     Raises
     ------

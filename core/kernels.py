@@ -64,29 +64,26 @@ class Library:
     set: Callable[[int], object] = field(compare=False)
 
 
-class _Held:
-    """The libraries that runs keep on one thread: how many runs, and the number of threads before the first."""
-
-    def __init__(self) -> None:
-        self._lock = threading.Lock()
-        self._runs: dict[Library, int] = {}
-        self._before: dict[Library, int] = {}
-
-    def take(self, library: Library) -> None:
-        with self._lock:
-            if not self._runs.get(library):
-                self._before[library] = library.get()
-                library.set(1)
-            self._runs[library] = self._runs.get(library, 0) + 1
-
-    def release(self, library: Library) -> None:
-        with self._lock:
-            self._runs[library] -= 1
-            if not self._runs[library]:
-                library.set(self._before[library])
+_LOCK = threading.Lock()
+_HELD: dict[Library, tuple[int, int]] = {}
+"""The libraries that runs keep on one thread: how many runs, and the number of threads before the first."""
 
 
-_HELD = _Held()
+def _take(library: Library) -> None:
+    with _LOCK:
+        runs, before = _HELD.get(library) or (0, library.get())
+        if not runs:
+            library.set(1)
+        _HELD[library] = runs + 1, before
+
+
+def _release(library: Library) -> None:
+    with _LOCK:
+        runs, before = _HELD.pop(library)
+        if runs > 1:
+            _HELD[library] = runs - 1, before
+        else:
+            library.set(before)
 
 
 @contextmanager
@@ -94,8 +91,8 @@ def one_thread(*libraries: Library) -> Iterator[None]:
     """Keep libraries on one thread; afterwards they have as many as before, once no other run needs one."""
     with ExitStack() as ends:
         for library in libraries:
-            _HELD.take(library)
-            ends.callback(_HELD.release, library)
+            _take(library)
+            ends.callback(_release, library)
         yield
 
 

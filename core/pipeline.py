@@ -12,10 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
+from .checks.doubts import doubting_jumps, doubting_scatter, gauge_scatter, strip_courses, warn_of_strips
 from .checks.lines import warn_of_rails, warn_of_split_classes, with_tracks
-from .checks.scatter import doubting_scatter, gauge_scatter
 from .checks.standard import head_widths, warn_of_gauge, warn_of_spacing
-from .checks.strips import doubting_jumps, strip_courses, warn_of_strips
 from .classify.settings import Settings
 from .clouds.las import CloudHeader
 from .clouds.points import RailPoints, Request, read_each
@@ -34,7 +33,7 @@ from .squares.grid import Key, MemorySource, PointSource, Square, around, assemb
 from .squares.pieces import SquareRails, rows_in_frame
 from .squares.remeasuring import measure_rails
 from .squares.spool import SpooledFile, SpooledPoints, gather, spool_file
-from .steps import clean_square, engine_for, rails_of_square, square_side, tracks_of, whole_rails
+from .squares.steps import clean_square, engine_for, rails_of_square, square_side, tracks_of, whole_rails
 from .tasks import Context, InTurn, Runner, Task
 from .tracks.geometry import measure_track_geometry
 from .tracks.parallels import widths_by_gauge

@@ -62,19 +62,7 @@ class RailRaster:
     y0: float
 
     def read(self, row: int, column: int, height: int, width: int) -> np.ndarray:
-        """Copy a window of cells; it is False outside the stored tiles.
-
-        Parameters
-        ----------
-        row, column : int
-            First row and first column of the window.
-        height, width : int
-            Size of the window in cells.
-
-        Returns
-        -------
-        (height, width) bool array
-        """
+        """Copy a window of cells, (height, width) bool, given its first row and column; False outside the tiles."""
         window = np.zeros((height, width), dtype=bool)
         for tile_row in range(row // TILE, (row + height - 1) // TILE + 1):
             for tile_column in range(column // TILE, (column + width - 1) // TILE + 1):
@@ -106,16 +94,9 @@ class RailRaster:
         return int(sum(np.count_nonzero(tile) for tile in self.tiles.values()))
 
     def to_local(self, rows_columns: np.ndarray) -> np.ndarray:
-        """Convert cell positions to local x, y in metres; (0, 0) is the centre of cell (0, 0).
+        """Convert cell positions, (n, 2) rows and columns, to local x, y in metres, (n, 2).
 
-        Parameters
-        ----------
-        rows_columns : (n, 2) array
-            May be fractions.
-
-        Returns
-        -------
-        (n, 2) array
+        They may be fractions; (0, 0) is the centre of cell (0, 0).
         """
         rows_columns = np.asarray(rows_columns, dtype=float)
         x = self.x0 + (rows_columns[:, 1] + 0.5) * self.cell_m
@@ -132,18 +113,13 @@ class RailRaster:
         margin: int,
         progress: Progress = SILENT,
     ) -> RailRaster:
-        """Apply `function` to every stored tile and its eight neighbours, each with `margin` cells around it.
+        """Apply a function to every stored tile and its eight neighbours, each with `margin` cells around it.
 
-        Parameters
-        ----------
-        function : callable
-            Maps a bool array of (TILE + 2 margin) × (TILE + 2 margin) cells to one of the same shape.
-        margin : int
-            Distance in cells within which other cells affect the result of a cell.
-        progress : Progress
+        The function maps a bool array to one of the same shape; cells farther than the margin must not affect a cell.
         """
-        tiles = {}
-        for index in progress.follow(sorted(self._neighbourhood())):
+        tiles, steps = {}, (-1, 0, 1)
+        near = {(row + down, column + right) for row, column in self.tiles for down in steps for right in steps}
+        for index in progress.follow(sorted(near)):
             row, column = index[0] * TILE - margin, index[1] * TILE - margin
             result = function(self.read(row, column, TILE + 2 * margin, TILE + 2 * margin))
             inner = result[margin : margin + TILE, margin : margin + TILE]
@@ -151,23 +127,12 @@ class RailRaster:
                 tiles[index] = np.array(inner, dtype=bool)
         return replace(self, tiles=tiles)
 
-    def _neighbourhood(self) -> set[tuple[int, int]]:
-        """Return the indices of the stored tiles and of their eight neighbours."""
-        steps = (-1, 0, 1)
-        return {(row + down, column + right) for row, column in self.tiles for down in steps for right in steps}
-
 
 def rasterize(xy: np.ndarray, cell_m: float) -> RailRaster:
-    """Rasterize rail points: a cell is set if it contains at least one point (docs/method.md section 2.2).
+    """Rasterize rail points, (n, 2) or (n, 3) local metres: a cell is set if it contains at least one.
 
-    Cell borders are multiples of `cell_m`, so that clouds with the same local origin share one grid.
-
-    Parameters
-    ----------
-    xy : (n, 2) or (n, 3) array
-        Points in local metres.
-    cell_m : float
-        Side of a cell in metres; see `cell_size`.
+    Cell borders are multiples of `cell_m` (see `cell_size`), so that clouds with the same local origin share one grid
+    (docs/method.md section 2.2).
     """
     xy = np.asarray(xy)
     parts = [xy[start : start + POINTS_AT_ONCE] for start in range(0, max(len(xy), 1), POINTS_AT_ONCE)]
@@ -176,14 +141,9 @@ def rasterize(xy: np.ndarray, cell_m: float) -> RailRaster:
 
 
 def _cells_of(xy: np.ndarray, cell_m: float) -> np.ndarray:
-    """Return the cells with points, (m, 2)."""
+    """Return the cells with points, each once, (m, 2); far fewer than points, on dense clouds."""
     rows = np.floor(-xy[:, 1] / cell_m + BORDER_CELLS).astype(np.int64)
     columns = np.floor(xy[:, 0] / cell_m + BORDER_CELLS).astype(np.int64)
-    return _unique_cells(rows, columns)
-
-
-def _unique_cells(rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
-    """Return each cell once, (m, 2); far fewer than points, on dense clouds."""
     if len(rows) and max(np.abs(rows).max(), np.abs(columns).max()) < ROW // 2:
         numbers = np.unique(rows * ROW + columns)
         rows = (numbers + ROW // 2) // ROW

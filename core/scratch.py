@@ -31,19 +31,10 @@ OWNER_ONLY = 0o777 if sys.platform == "win32" else 0o700
 
 @contextmanager
 def scratch_folder(parent: Path) -> Iterator[Path]:
-    """Create a folder that no other process knows or uses, and delete it in any case.
+    """Create a folder in another one that no other process knows or uses, and delete it in any case.
 
     Its name is unpredictable, and creating it fails if anything has this name, so that nobody can direct the files
     elsewhere with a symbolic link.
-
-    Parameters
-    ----------
-    parent : Path
-        Existing folder.
-
-    Yields
-    ------
-    Path
 
     Raises
     ------

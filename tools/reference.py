@@ -19,8 +19,7 @@ from qgis.core import (  # noqa: E402
     QgsProcessingParameterNumber,
     QgsProcessingProvider,
 )
-from rail_extract.core.fields import Field  # noqa: E402
-from rail_extract.core.products import (  # noqa: E402
+from rail_extract.core.fields import (  # noqa: E402
     AIRBORNE,
     AXES,
     CENTERLINES,
@@ -34,6 +33,7 @@ from rail_extract.core.products import (  # noqa: E402
     RAILS,
     STATIONS,
     STOPS,
+    Field,  # noqa: E402
 )
 from rail_extract.core.standards import CUSTOM, SOURCES, STANDARDS  # noqa: E402
 from rail_extract.rail_extract_plugin.algorithms import ALGORITHMS  # noqa: E402

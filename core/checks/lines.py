@@ -1,10 +1,11 @@
-"""Lines that do not look like rails: lone ones beside tracks, those of split classes, and none at all.
+"""Lines that do not look like rails: lone ones beside tracks, those of split classes, none at all, and displaced ones.
 
 See docs/method.md section 8.10.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -12,12 +13,12 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..errors import NoTrackError
-from ..heads.smoothing_check import warn_if_out_of_reach
+from ..lines.smoothing import END_SHIFT, STATIONS_PER_SIGMA, filled, smooth_line
 from ..parameters import Parameters
-from ..polyline import resample, unit_tangents
+from ..polyline import interpolate, is_closed, length_along, resample, unit_tangents
 from ..progress import SILENT, Progress
 from ..rails import Centerline, RailLine
-from ..steps import tracks_of_class
+from ..squares.steps import tracks_of_class
 
 NO_LINE = (
     "The points found in the raw cloud give no rail: they are too few, or not on rails. Check the rail standard, the "
@@ -47,6 +48,14 @@ track, for the line to be left out."""
 
 SAME_RAIL_M = 0.5
 """Ends of rails that are closer together belong to one rail: no two rails of any gauge end so close to each other."""
+
+
+MAX_SHIFT_HEADS = 0.5
+"""Largest displacement, in head widths, that points correct to within a centimetre, because the line is still above the
+head. For a head of 72 mm in an arc of 15 m radius, 40 mm are corrected and 90 mm are not."""
+
+MIN_RADIUS_M = 10.0
+"""Radius of the tightest tram curve; a line that bends more sharply is not following a rail."""
 
 
 def _off_level_m(rail: RailLine, centerlines: Sequence[Centerline]) -> float:
@@ -99,7 +108,32 @@ def warn_of_rails(
     if not rails:
         checks = "check the rail classes, the standard and MIN_LENGTH"
         progress.warning(NO_LINE if raw else f"Class {class_code} has no rails: {checks}.")
-    warn_if_out_of_reach(rails, parameters.head_width_m, parameters.smoothing_xy_m, progress)
+    _warn_of_smoothing(rails, parameters.head_width_m, parameters.smoothing_xy_m, progress)
+
+
+def _warn_of_smoothing(rails: Sequence[RailLine], head_width_m: float, smoothing_m: float, progress: Progress) -> None:
+    """Warn the user if the smoothing in plan displaces lines in curves by more than the points can correct."""
+    limit_m = MAX_SHIFT_HEADS * head_width_m
+    if END_SHIFT * smoothing_m**2 / MIN_RADIUS_M <= limit_m:
+        return
+    largest_m = max((displacement(rail.xyz[:, :2], smoothing_m) for rail in rails), default=0.0)
+    if largest_m > limit_m:
+        best_m = math.floor(10 * smoothing_m * math.sqrt(limit_m / largest_m)) / 10
+        progress.warning(
+            f"SMOOTHING_XY of {smoothing_m:g} m displaces lines in curves by up to {1000 * largest_m:.0f} mm, more "
+            f"than points can correct: set it to {best_m:g} m or less."
+        )
+
+
+def displacement(line: np.ndarray, smoothing_m: float) -> float:
+    """Return the largest displacement of a line, (n, 2), by PAEK, metres.
+
+    Applied to a line that follows its rail, it shows how far the line was displaced before.
+    """
+    t = length_along(line)
+    stations = filled(t, smoothing_m / STATIONS_PER_SIGMA)
+    smoothed = smooth_line(line, smoothing_m, stations, closed=is_closed(line))
+    return float(np.hypot(*(smoothed - interpolate(line, t, stations)).T).max())
 
 
 def with_tracks(

@@ -14,7 +14,6 @@ from ..classify.square import classify_square
 from ..clouds.points import Request
 from ..errors import CloudError, ParameterError
 from ..heads.blunt import blunt_share
-from ..heads.gauge_estimate import Spacings, measure_spacings
 from ..heads.roads import MIN_WIDER_M
 from ..heads.sections import likelier_width
 from ..parameters import Parameters
@@ -24,6 +23,7 @@ from ..squares.density import fullest_square
 from ..squares.grid import PointSource
 from ..standards import HEAD_WIDTH_RANGE_MM, SAME_GAUGE_M, STANDARDS, Gauge, RailStandard, closest_standard
 from ..tracks.parallels import width_at
+from .gauge_estimate import Spacings, measure_spacings
 
 SAMPLE_M = 50.0
 """Half the side of the area whose points show the width of the heads."""
@@ -69,7 +69,7 @@ def detect_standard(request: Request, progress: Progress = SILENT) -> RailStanda
     ParameterError
         The points are too sparse, or no standard fits.
     """
-    xyz, census = request.sample_with_census()
+    xyz, census = request.sample()
     if not len(xyz):
         raise request.explain_none(census)
     return _detected(measure_spacings(xyz), progress)
@@ -80,7 +80,7 @@ def detect_in_raw(request: Request, progress: Progress = SILENT) -> RailStandard
 
     Parameters and errors are those of `detect_standard`; the request is for `standards.SEARCHED_CLASSES`.
     """
-    xyz, census = request.sample_with_census(RAW_SAMPLE_POINTS)
+    xyz, census = request.sample(RAW_SAMPLE_POINTS)
     if not len(xyz):
         raise request.explain_none(census)
     corners = np.floor(xyz[:, :2] / RAW_SQUARE_M).astype(np.int64)
@@ -142,7 +142,7 @@ def warn_of_gauge(request: Request, parameters: Parameters, progress: Progress) 
         Whether the user has been warned.
     """
     try:
-        sample = request.sample()
+        sample = request.sample()[0]
     except CloudError:
         return False  # reported when the points are sorted
     return _warn_of_spacing(sample, parameters, progress)

@@ -95,19 +95,10 @@ def parse_crs(text: str) -> pyproj.CRS:
 
 
 def crs_of_geokeys(crs: pyproj.CRS | None, keys: dict[int, int]) -> pyproj.CRS | None:
-    """Correct a coordinate system read from GeoTIFF keys, using the keys for model type and heights.
+    """Correct a coordinate system read from GeoTIFF keys, given by number, using those for model type and heights.
 
-    Parameters
-    ----------
-    crs : pyproj.CRS or None
-        Built from the keys for projected and geographic systems only.
-    keys : dict of int to int
-        Values by key number.
-
-    Returns
-    -------
-    pyproj.CRS or None
-        None for a projection without a code, because the coordinates are not in its geographic base.
+    The system given is built from the keys for projected and geographic systems only. Returns None for a projection
+    without a code, because the coordinates are not in its geographic base.
     """
     if crs is None or (crs.is_geographic and keys.get(MODEL_TYPE_KEY) == MODEL_PROJECTED):
         return None
@@ -260,7 +251,6 @@ def warn_of_scale(
     what, it : str
         Subject and verb of the sentence, such as "cloud.laz is", and the pronoun that refers to the subject.
     progress : Progress
-        Takes the warning.
     """
     plane = _plane(crs)
     known = [one for one in _scales(plane, places) if np.isfinite(one).all()] if plane.is_projected else []
@@ -293,11 +283,7 @@ def _scales(plane: pyproj.CRS, places: Sequence[tuple[float, float]]) -> Iterato
 
 
 def common_crs(systems: Sequence[tuple[str, pyproj.CRS | None]]) -> pyproj.CRS | None:
-    """Return the system that all files share; None if no file states one.
-
-    Parameters
-    ----------
-    systems : sequence of (file name, CRS or None)
+    """Return the system that all files share, given (file name, CRS or None) of each; None if no file states one.
 
     Raises
     ------
@@ -316,15 +302,9 @@ def common_crs(systems: Sequence[tuple[str, pyproj.CRS | None]]) -> pyproj.CRS |
 
 
 def same_plane(first_wkt: str, second_wkt: str, xy: tuple[float, float]) -> bool:
-    """Return whether plan coordinates mean the same place in two systems; heights are ignored.
+    """Return whether plan coordinates mean the same place in two systems, in their units; heights are ignored.
 
     Descriptions of one system differ from file to file; what counts is where they put the rails.
-
-    Parameters
-    ----------
-    first_wkt, second_wkt : str
-    xy : (x, y)
-        Coordinates to compare, in units of the systems.
     """
     pyproj = import_pyproj()
     plane = [_plane(parse_crs(wkt)) for wkt in (first_wkt, second_wkt)]

@@ -14,7 +14,7 @@ import numpy as np
 from ..errors import CloudError, EmptyCloudError
 from ..parameters import OVERLAP, SYNTHETIC
 from ..progress import Progress
-from . import copc, laz
+from . import laz
 from .crs import MAX_COORDINATE, crs_of_geokeys, import_pyproj
 from .passes import marks_of
 from .readers import CloudHeader, Extent, Part
@@ -73,14 +73,14 @@ def read_header(path: Path) -> CloudHeader:
 def read_chunks(
     path: Path, progress: Progress, extent: Extent | np.ndarray | None, leave_out: Sequence[str]
 ) -> Iterator[Part]:
-    """Check a file and read it chunk by chunk; see `readers.Reader`."""
+    """Check a file and read it chunk by chunk; see `readers.read_classes`."""
     with _open(path) as reader:
         header, done, chunks, some = reader.header, 0, None, None
         timed = "gps_time" in header.point_format.dimension_names
         if header.are_points_compressed:
             chunks = laz.read_chunk_table(path, header)
             laz.check_layers(path, header, chunks, progress)
-            some = copc.chunks_in(path, header, chunks, extent) if extent is not None else None
+            some = laz.chunks_in(path, header, chunks, extent) if extent is not None else None
         total = header.point_count if some is None else sum(one.points for one in some)
         for chunk in read_blocks(path, reader, FIELDS, chunks if some is None else some):
             progress.check()
@@ -111,17 +111,7 @@ def read_blocks(
     fields: laspy.DecompressionSelection,
     chunks: Sequence[laz.Chunk] | None = None,
 ) -> Iterator[laspy.ScaleAwarePointRecord]:
-    """Read the points of a file block by block.
-
-    Parameters
-    ----------
-    path : Path
-    reader : LasReader
-    fields : DecompressionSelection
-        What to decompress.
-    chunks : sequence of Chunk, optional
-        Compressed chunks to read; all by default.
-    """
+    """Read the points of a file block by block: the fields given, of all compressed chunks or of those given."""
     header = reader.header
     most = max(1, min(CHUNK, MAX_READ // header.point_format.size))
     if not header.are_points_compressed:
@@ -213,24 +203,30 @@ def _check_header(path: Path, header: laspy.LasHeader) -> None:
         )
 
 
-def _late_projection_records(path: Path, header: laspy.LasHeader) -> VLRList:
-    """Read the records after the points that state the coordinate system; others may hold gigabytes of waveforms."""
-    records, at, size = VLRList(), header.start_of_first_evlr, path.stat().st_size
+def late_records(path: Path, header: laspy.LasHeader) -> Iterator[tuple[int, int, bytes]]:
+    """Yield start, end and user of each record after the points, some of which hold gigabytes of waveforms."""
+    at, size = header.start_of_first_evlr, path.stat().st_size
     with path.open("rb") as file:
         for _ in range(header.number_of_evlrs):
-            end = at + EVLR_HEADER
-            if end <= size:
-                file.seek(at)
-                start = file.read(EVLR_HEADER)
-                end += int.from_bytes(start[20:28], "little")
-            if end > size:
+            file.seek(min(at, size))
+            start = file.read(EVLR_HEADER)
+            end = at + EVLR_HEADER + int.from_bytes(start[20:28], "little")
+            if len(start) < EVLR_HEADER or end > size:
                 raise CloudError(
                     f"{path.name} is cut off: the records after its points are missing; copy or export it again."
                 )
-            if start[2:18].rstrip(b"\0") == PROJECTION_USER:
-                file.seek(at)
-                records += VLRList.read_from(file, 1, extended=True)
+            yield at, end, start[2:18].rstrip(b"\0")
             at = end
+
+
+def _late_projection_records(path: Path, header: laspy.LasHeader) -> VLRList:
+    """Read the records after the points that state the coordinate system."""
+    records = VLRList()
+    with path.open("rb") as file:
+        for start, _, user in late_records(path, header):
+            if user == PROJECTION_USER:
+                file.seek(start)
+                records += VLRList.read_from(file, 1, extended=True)
     return records
 
 

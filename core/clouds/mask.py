@@ -47,8 +47,7 @@ class Mask:
         inside = self._inside[rows, columns] & covered
         close = np.flatnonzero(self._border[rows, columns] & covered)
         close = close[np.argsort(rows[close], kind="stable")]
-        for start, end in _runs(rows[close]):
-            some = close[start:end]
+        for some in np.split(close, np.flatnonzero(np.diff(rows[close])) + 1) if len(close) else ():
             inside[some] = _odd_crossings(xy[some], self._edges_in(int(rows[some[0]])))
         return inside
 
@@ -94,12 +93,6 @@ class Mask:
         low = self.extent[1] + (row - 1) * self._side
         y = self.edges[:, 1::2]
         return self.edges[(y.min(axis=1) <= low + self._side) & (y.max(axis=1) >= low)]
-
-
-def _runs(values: np.ndarray) -> list[tuple[int, int]]:
-    """Return start and end of runs of equal values."""
-    starts = np.flatnonzero(np.append(True, values[1:] != values[:-1])) if len(values) else np.empty(0, dtype=np.int64)
-    return list(zip(starts.tolist(), [*starts[1:].tolist(), len(values)]))
 
 
 def _odd_crossings(xy: np.ndarray, edges: np.ndarray) -> np.ndarray:

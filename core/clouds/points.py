@@ -17,7 +17,7 @@ from ..tasks import READ_S, Runner, Task, in_listed_order
 from .crs import common_crs, is_geographic, name_of, parse_crs, units, utm_zone, warn_of_scale
 from .mask import Mask
 from .passes import number_passes
-from .readers import Chunk, CloudHeader, Extent, Paths, list_files, read_classes, read_header
+from .readers import Chunk, CloudHeader, Extent, Paths, either, list_files, read_classes, read_header
 
 Result = TypeVar("Result")
 
@@ -202,22 +202,13 @@ class Request:
         xmin, ymin, xmax, ymax = zip(*areas)
         return max(xmin), max(ymin), min(xmax), min(ymax)
 
-    def sample(self, count: int = SAMPLE_POINTS) -> np.ndarray:
-        """Read the first points requested, (n, 3) metres from one of them; see `sample_with_census`."""
-        return self.sample_with_census(count)[0]
-
-    def sample_with_census(self, count: int = SAMPLE_POINTS) -> tuple[np.ndarray, np.ndarray]:
+    def sample(self, count: int = SAMPLE_POINTS) -> tuple[np.ndarray, np.ndarray]:
         """Read the first points requested; takes a few seconds for a cloud of any size.
-
-        Parameters
-        ----------
-        count : int
-            Number of points that is enough.
 
         Returns
         -------
         xyz : (n, 3) array
-            Metres from one of them.
+            Metres from one of them; `count` of them are enough.
         census : (256,) int array
             Number of points of each class that were passed.
 
@@ -238,9 +229,7 @@ class Request:
 
     def shares(self, progress: Progress) -> list[Progress]:
         """Split the progress among the files in proportion to their points."""
-        counts = np.array([header.point_count for header in self.headers], dtype=float)
-        after = np.cumsum(counts) / counts.sum()
-        return [progress.span(end - count / counts.sum(), end) for end, count in zip(after, counts)]
+        return progress.divide([header.point_count for header in self.headers])
 
     def frame_at(self, steps: Sequence[tuple[np.ndarray, np.ndarray]]) -> LocalFrame:
         """Return the frame with its origin at the points' median, from values and counts of `origin_steps` by axis."""
@@ -255,7 +244,7 @@ class Request:
                 f"The {self.where} contains no points of class {wanted}: choose a larger {self.where}."
             )
         if not census.any():
-            flags = _either("withheld", *map(str.lower, self.leave_out))
+            flags = either("withheld", *map(str.lower, self.leave_out))
             return NoRailPointsError(
                 f"All points of the cloud are marked as {flags}: export the valid points without this mark."
             )
@@ -410,12 +399,6 @@ def _collect(request: Request, progress: Progress) -> tuple[np.ndarray, np.ndarr
     if not len(codes):
         raise request.explain_none(census)
     return xyz, codes, marks
-
-
-def _either(*words: str) -> str:
-    """Enumerate words: withheld, overlap or synthetic."""
-    *others, last = words
-    return f"{', '.join(others)} or {last}" if others else last
 
 
 def _overlap(a: Extent, b: Extent) -> bool:

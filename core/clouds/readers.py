@@ -1,33 +1,29 @@
-"""Formats of point clouds: which module reads which suffix, and which files a path stands for.
-
-To add a format, write a module with the functions of `Reader` and add its suffix to `READERS`.
-"""
+"""Point clouds in files: which files a path stands for, their headers and their points."""
 
 from __future__ import annotations
 
 import errno
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
-from typing import Protocol, Union, cast
+from types import ModuleType
+from typing import Union
 
 import numpy as np
 
 from ..errors import Cancelled, CloudError, EmptyCloudError, RailExtractError
 from ..progress import SILENT, Progress
-from .vpc import list_tiles
+from .vpc import Extent, list_tiles
 
-READERS = {".las": "las", ".laz": "las"}
-"""Module of this package by the suffix of the files it reads. It is imported on first use, because QGIS lacks the
-packages that readers need. COPC files end in .copc.laz."""
+SUFFIXES = (".las", ".laz")
+"""Suffixes of files that are read. COPC files end in .copc.laz."""
 
 OTHER_FORMATS = {".ply": "a PLY", ".e57": "an E57", ".pts": "a PTS", ".ptx": "a PTX", ".xyz": "an XYZ"}
 """Formats of point clouds that are not read: rail points have a class, and lengths need a coordinate system."""
 
-CATALOGUES: dict[str, Callable[[Path], Sequence[Path]]] = {".vpc": list_tiles}
-"""Functions that list the clouds named in a file, by its suffix."""
+CATALOGUE = ".vpc"
+"""Suffix of files that name clouds."""
 
 NOT_OF_THE_FILE = (RailExtractError, Cancelled, MemoryError, KeyboardInterrupt, SystemExit, GeneratorExit)
 """What a reader raises for other reasons than an unforeseen damage of the file."""
@@ -37,9 +33,6 @@ NO_THREADS = "ThreadPoolBuildError"
 
 IMPOSSIBLE = (None, errno.EINVAL, errno.EOVERFLOW)
 """Codes of an `OSError` that a damaged file causes, such as by a position before its start."""
-
-Extent = tuple[float, float, float, float]
-"""Smallest x, smallest y, largest x, largest y, in units of the CRS."""
 
 Chunk = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 """Coordinates (n, 3) in units of the CRS, classes (n,) and marks (n,) of the points that were kept, and the number of
@@ -79,21 +72,6 @@ class CloudHeader:
     crs_wkt: str | None
 
 
-class Reader(Protocol):
-    """What a module in `READERS` offers."""
-
-    def read_header(self, path: Path) -> CloudHeader:
-        """Read and check the header of a file, without its points; see `read_header`."""
-
-    def read_chunks(
-        self, path: Path, progress: Progress, extent: Extent | np.ndarray | None, leave_out: Sequence[str]
-    ) -> Iterator[Part]:
-        """Read all points of a file chunk by chunk, or those that may be in an extent; see `read_classes`."""
-
-    def shows_scanner(self, path: Path) -> bool:
-        """Return whether the first points of a file have what only a scanner measures; see `shows_scanner`."""
-
-
 def read_header(path: Path) -> CloudHeader:
     """Read and check the header of one file, without its points.
 
@@ -102,8 +80,8 @@ def read_header(path: Path) -> CloudHeader:
     CloudError
         The file has an unknown suffix, is damaged, is cut off or has no points.
     """
-    with explained(path):
-        return _reader(path).read_header(path)
+    with _reader(path) as las:
+        return las.read_header(path)
 
 
 def shows_scanner(path: Path) -> bool:
@@ -111,8 +89,8 @@ def shows_scanner(path: Path) -> bool:
 
     Points that are matched from images have none of these. Raises errors as `read_header` does.
     """
-    with explained(path):
-        return _reader(path).shows_scanner(path)
+    with _reader(path) as las:
+        return las.shows_scanner(path)
 
 
 def first_header(paths: Paths) -> CloudHeader:
@@ -164,41 +142,25 @@ def read_classes(
     """
     wanted = np.zeros(256, dtype=bool)
     wanted[list(class_codes)] = True
-    with explained(path):
-        for places, codes, marks, valid, whole in _reader(path).read_chunks(path, progress, extent, leave_out):
+    with _reader(path) as las:
+        for places, codes, marks, valid, whole in las.read_chunks(path, progress, extent, leave_out):
             keep = np.flatnonzero(wanted[codes] & valid)
             counted = codes[valid] if whole else codes[keep]
             yield places(keep), codes[keep], marks[keep], np.bincount(counted, minlength=256)
 
 
 def read_points(path: Path, progress: Progress = SILENT, leave_out: Sequence[str] = ()) -> Iterator[Points]:
-    """Read all points of a file chunk by chunk, in the order of the file.
+    """Read all points of a file chunk by chunk, in the order of the file; see `Points` and `read_classes`.
 
-    Parameters
-    ----------
-    path : Path
-    progress : Progress
-    leave_out : sequence of str
-        See `read_classes`.
-
-    Yields
-    ------
-    xyz : (n, 3) array
-        In units of the CRS.
-    codes : (n,) uint8 array
-        Classes.
-    marks : (n,) uint32 array
-        See `read_classes`.
-    valid : (n,) bool array
-        Points that are neither withheld nor to be left out.
+    Points that are withheld or have a flag to leave out are yielded, too, and marked as such.
 
     Raises
     ------
     CloudError
         See `read_classes`.
     """
-    with explained(path):
-        for places, codes, marks, valid, _ in _reader(path).read_chunks(path, progress, None, leave_out):
+    with _reader(path) as las:
+        for places, codes, marks, valid, _ in las.read_chunks(path, progress, None, leave_out):
             yield places(slice(None)), codes, marks, valid
 
 
@@ -242,7 +204,7 @@ def list_files(paths: Paths) -> tuple[Path, ...]:
     if not files:
         raise CloudError("No point cloud was given: name a file or a folder of tiles.")
     for file in files:
-        _module_of(file)
+        _check_format(file)
     return tuple({file.resolve(): file for file in reversed(files)}.values())[::-1]
 
 
@@ -255,38 +217,42 @@ def _files_of(path: Path) -> Sequence[Path]:
         return [file for match in matches for file in _files_of(match)]
     if not path.exists():
         raise CloudError(
-            f"{path} does not exist: give a {_any_of((*READERS, *CATALOGUES))} file, or a folder of tiles, on this "
+            f"{path} does not exist: give a {either(*SUFFIXES, CATALOGUE)} file, or a folder of tiles, on this "
             "computer."
         )
     if not path.is_dir() and not path.is_file():
         raise CloudError(f"{path} is a pipe or a device, not a file: copy the cloud into a file.")
     if not path.is_dir():
-        return CATALOGUES.get(path.suffix.lower(), lambda file: [file])(path)
+        return list_tiles(path) if path.suffix.lower() == CATALOGUE else [path]
     # On file systems other than its own, macOS puts a hidden file next to each: its name starts with a dot.
-    tiles = sorted(file for file in path.iterdir() if file.suffix.lower() in READERS and file.name[0] != ".")
+    tiles = sorted(file for file in path.iterdir() if file.suffix.lower() in SUFFIXES and file.name[0] != ".")
     if not tiles:
-        raise CloudError(f"The folder {path} contains no {_any_of(READERS)} file: choose another folder.")
+        raise CloudError(f"The folder {path} contains no {either(*SUFFIXES)} file: choose another folder.")
     return tiles
 
 
-def _reader(path: Path) -> Reader:
-    return cast(Reader, import_module(f".{_module_of(path)}", __package__))
+@contextmanager
+def _reader(path: Path) -> Iterator[ModuleType]:
+    """Provide the module that reads a file; what it raises because of the file becomes a `CloudError`."""
+    _check_format(path)
+    with explained(path):
+        from . import las  # not before: QGIS lacks the packages that it needs
+
+        yield las
 
 
-def _module_of(path: Path) -> str:
-    """Name the module that reads a file."""
-    module = READERS.get(path.suffix.lower())
-    if module is None and path.suffix.lower() in OTHER_FORMATS:
+def _check_format(path: Path) -> None:
+    suffix = path.suffix.lower()
+    if suffix in OTHER_FORMATS:
         raise CloudError(
-            f"{path.name} is {OTHER_FORMATS[path.suffix.lower()]} file, which states neither classes nor a coordinate "
+            f"{path.name} is {OTHER_FORMATS[suffix]} file, which states neither classes nor a coordinate "
             "system in a standard way: convert it to LAS or LAZ, for example with CloudCompare or PDAL."
         )
-    if module is None:
-        raise CloudError(f"{path.name} has no suffix of a known cloud format: export the cloud as {_any_of(READERS)}.")
-    return module
+    if suffix not in SUFFIXES:
+        raise CloudError(f"{path.name} has no suffix of a known cloud format: export the cloud as {either(*SUFFIXES)}.")
 
 
-def _any_of(suffixes: Iterable[str]) -> str:
-    """Enumerate suffixes: .las, .laz or .vpc."""
-    *others, last = suffixes
+def either(*words: str) -> str:
+    """Enumerate words: .las, .laz or .vpc."""
+    *others, last = words
     return f"{', '.join(others)} or {last}" if others else last

@@ -7,13 +7,12 @@ import struct
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
-from typing import BinaryIO
 
 import numpy as np
 
 from ..errors import ParameterError
 from ..progress import SILENT, Progress
-from .las import coordinates, laspy, read_blocks
+from .las import coordinates, laspy, late_records, read_blocks
 from .laz import lazrs
 from .readers import explained
 
@@ -27,8 +26,8 @@ classes (n,) and which points to write (n,) bool."""
 LAST_OLD_FORMAT, LAST_OLD_CLASS = 5, 31
 """Point formats 0 to 5 have five bits for the class."""
 
-RECORD_HEAD, RECORD_BLOCK = 60, 1 << 20
-"""Bytes of the head of a record behind the points, an EVLR of LAS 1.4, and bytes that are copied at once."""
+RECORD_BLOCK = 1 << 20
+"""Bytes of a record behind the points that are copied at once."""
 
 RECORDS_AT = 235
 """Place in the header of LAS 1.4 of the start of the first of these records, followed by their number."""
@@ -60,20 +59,11 @@ def check_class(path: Path, class_code: int) -> None:
 
 
 def rewrite(path: Path, new: Path, change: Change, progress: Progress = SILENT) -> int:
-    """Write a copy of a file with other classes, and return how many points it has.
+    """Write a copy of a file that has been read and checked with other classes, and return how many points it has.
 
     The order of the points, their other dimensions, the scale and the records of the header stay. A COPC file becomes
-    a LAZ or LAS file without the records of its octree, and LAS 1.0, which laspy does not write, becomes 1.2.
-
-    Parameters
-    ----------
-    path : Path
-        A file that has been read and checked.
-    new : Path
-        Compressed if its suffix is .laz.
-    change : callable
-        See `Change`.
-    progress : Progress
+    a LAZ or LAS file without the records of its octree, and LAS 1.0, which laspy does not write, becomes 1.2. The copy
+    is compressed if its suffix is .laz.
 
     Raises
     ------
@@ -105,7 +95,7 @@ def rewrite(path: Path, new: Path, change: Change, progress: Progress = SILENT) 
         except WRITE_ERRORS as error:
             raise OSError(str(error)) from error
         if header.number_of_evlrs:
-            _append_records(path, header.start_of_first_evlr, header.number_of_evlrs, new)
+            _append_records(path, header, new)
     return written
 
 
@@ -117,46 +107,20 @@ def _version(header: laspy.LasHeader) -> laspy.header.Version:
     return laspy.header.Version.from_str(dims.preferred_file_version_for_point_format(number))
 
 
-def _append_records(path: Path, start: int, count: int, new: Path) -> None:
+def _append_records(path: Path, header: laspy.LasHeader, new: Path) -> None:
     """Copy the records behind the points of a file, which may be larger than memory, without those of an octree."""
-    with new.open("r+b") as target:
-        first, kept = target.seek(0, os.SEEK_END), 0
-        for is_head, block in _record_blocks(path, start, count):
-            kept += is_head
-            target.write(block)
+    with explained(path):
+        records = [(start, end) for start, end, user in late_records(path, header) if user != COPC.encode()]
+    with new.open("r+b") as target, path.open("rb") as source:
+        first = target.seek(0, os.SEEK_END)
+        for start, end in records:
+            for at in range(start, end, RECORD_BLOCK):
+                with explained(path):
+                    source.seek(at)
+                    block = source.read(min(RECORD_BLOCK, end - at))
+                target.write(block)
         target.seek(RECORDS_AT)
-        target.write(struct.pack("<QI", first if kept else 0, kept))
-
-
-def _record_blocks(path: Path, start: int, count: int) -> Iterator[tuple[bool, bytes]]:
-    """Read the records behind the points of a file block by block; whether each block is the head of a record."""
-    with explained(path), path.open("rb") as source:
-        source.seek(start)
-        for _ in range(count):
-            head = _read(source, RECORD_HEAD)
-            remaining = int.from_bytes(head[20:28], "little")
-            if head[2:18].rstrip(b"\0") == COPC.encode():
-                source.seek(remaining, os.SEEK_CUR)
-                continue
-            yield True, head
-            while remaining:
-                block = _read(source, min(remaining, RECORD_BLOCK))
-                remaining -= len(block)
-                yield False, block
-
-
-def _read(source: BinaryIO, length: int) -> bytes:
-    """Read exactly this number of bytes.
-
-    Raises
-    ------
-    ValueError
-        The file ends before.
-    """
-    block = source.read(length)
-    if len(block) < length:
-        raise ValueError("a record behind the points is cut off")
-    return block
+        target.write(struct.pack("<QI", first if records else 0, len(records)))
 
 
 def _chunks(path: Path, reader: laspy.LasReader, progress: Progress) -> Iterator[laspy.ScaleAwarePointRecord]:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable
 from pathlib import Path, PurePosixPath
 
 from ..errors import CloudError
+
+Extent = tuple[float, float, float, float]
+"""Smallest x, smallest y, largest x, largest y, in units of the CRS."""
 
 
 def list_tiles(catalogue: Path) -> tuple[Path, ...]:
@@ -34,40 +36,23 @@ def list_tiles(catalogue: Path) -> tuple[Path, ...]:
     return tiles
 
 
-@dataclass(frozen=True)
-class CatalogueTile:
-    """A tile of a virtual point cloud.
-
-    Attributes
-    ----------
-    href : str
-        Path from the folder of the catalogue.
-    point_count : int
-    extent : tuple of float
-        Smallest x, smallest y, largest x, largest y.
-    """
-
-    href: str
-    point_count: int
-    extent: tuple[float, float, float, float]
-
-
-def catalogue_text(tiles: Sequence[CatalogueTile], crs_wkt: str | None) -> str:
+def catalogue_text(tiles: Iterable[tuple[str, int, Extent]], crs_wkt: str | None) -> str:
     """Return the text of a virtual point cloud.
 
     Parameters
     ----------
-    tiles : sequence of CatalogueTile
+    tiles : iterable of (href, point count, extent)
+        Path of each from the folder of the catalogue, and smallest x, smallest y, largest x, largest y.
     crs_wkt : str or None
         Coordinate system of all tiles.
     """
-    features = [_feature(tile, crs_wkt) for tile in tiles]
+    features = [_feature(*tile, crs_wkt) for tile in tiles]
     return json.dumps({"type": "FeatureCollection", "features": features}, indent=1)
 
 
-def _feature(tile: CatalogueTile, crs_wkt: str | None) -> dict:
+def _feature(href: str, point_count: int, extent: Extent, crs_wkt: str | None) -> dict:
     """Describe a tile as an item of STAC."""
-    west, south, east, north = tile.extent
+    west, south, east, north = extent
     ring = [[west, south], [east, south], [east, north], [west, north], [west, south]]
     outline = {"type": "Polygon", "coordinates": [ring]}
     return {
@@ -77,18 +62,18 @@ def _feature(tile: CatalogueTile, crs_wkt: str | None) -> dict:
             "https://stac-extensions.github.io/pointcloud/v1.0.0/schema.json",
             "https://stac-extensions.github.io/projection/v1.1.0/schema.json",
         ],
-        "id": PurePosixPath(tile.href).stem,
+        "id": PurePosixPath(href).stem,
         "geometry": outline,
         "bbox": [west, south, east, north],
         "properties": {
             "datetime": None,
-            "pc:count": tile.point_count,
+            "pc:count": point_count,
             "pc:type": "lidar",
-            "pc:encoding": PurePosixPath(tile.href).suffix,
+            "pc:encoding": PurePosixPath(href).suffix,
             "proj:bbox": [west, south, east, north],
             "proj:geometry": outline,
             **({"proj:wkt2": crs_wkt} if crs_wkt else {}),
         },
         "links": [],
-        "assets": {"data": {"href": tile.href, "roles": ["data"]}},
+        "assets": {"data": {"href": href, "roles": ["data"]}},
     }

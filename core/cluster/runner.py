@@ -19,24 +19,18 @@ from distributed import Client, Future, as_completed
 
 from ..disk import writing
 from ..errors import CloudError, DiskError, RailExtractError
-from ..progress import SILENT, Progress
+from ..progress import SILENT, Progress, Recording
 from ..scratch import discard, sweep
 from ..tasks import Context, Name, Once, Task, in_order
 from .store import CORE, DamagedError, Stored, can_store, fingerprint, load, save, version
 
 
 @dataclass(frozen=True)
-class Failure:
-    """The reason why a task has no result: one sentence."""
-
-    reason: str
-
-
-@dataclass(frozen=True)
 class Answer:
-    """What a worker returns: a `Stored`, a `Failure` or a result that `store` does not keep, and its warnings."""
+    """What a worker returns: a `Stored` or a result that `store` does not keep, or why there is none, and warnings."""
 
-    result: Any
+    result: Any = None
+    failure: str | None = None
     warnings: tuple[str, ...] = ()
 
 
@@ -93,18 +87,17 @@ class DaskRunner:
             name = running.pop(future)
             answer = _answer(future, tasks[name].label)
             self._warn(answer.warnings, progress)
-            result = answer.result
-            if isinstance(result, Failure):
-                self.failures.append(result.reason)
+            if answer.failure is not None:
+                self.failures.append(answer.failure)
             else:
-                results[name] = result
+                results[name] = answer.result
             order.done(name)
             submit_ready()
             done += tasks[name].weight
             progress.set_fraction(done / total)
             if name in results and tasks[name].returned:
                 try:
-                    yield name, load(result) if isinstance(result, Stored) else result
+                    yield name, _loaded(answer.result)
                 except DamagedError as error:
                     self.failures.append(f"{tasks[name].label} failed ({error}): start the run again.")
 
@@ -122,7 +115,7 @@ class DaskRunner:
 
 
 def execute(task: Task, inputs: Mapping[Hashable, Any], folder: str, expected_version: str) -> Answer:
-    """Execute a task on a worker, unless its result is there already.
+    """Execute a task on a worker, unless its result is in the folder already.
 
     Parameters
     ----------
@@ -130,7 +123,6 @@ def execute(task: Task, inputs: Mapping[Hashable, Any], folder: str, expected_ve
     inputs : mapping of Hashable to Stored or Any
         Results of the tasks that this one takes.
     folder : str
-        Where results are kept.
     expected_version : str
         Version of the code and the weights that asks for the task; see `store.version`.
 
@@ -141,18 +133,18 @@ def execute(task: Task, inputs: Mapping[Hashable, Any], folder: str, expected_ve
     """
     if version() != expected_version:
         return Answer(
-            Failure(f"A worker has another version of Rail Extract ({CORE.parent}): install the same everywhere.")
+            failure=f"A worker has another version of Rail Extract ({CORE.parent}): install the same everywhere."
         )
     _sweep_once(folder)
-    heard = _Warnings()
+    heard = Recording(SILENT)
     try:
-        return Answer(_result(task, inputs, Path(folder), expected_version, heard), tuple(heard.texts))
+        return Answer(_result(task, inputs, Path(folder), expected_version, heard), warnings=heard.warnings)
     except DiskError:
         raise
     except CloudError as error:
-        return Answer(Failure(str(error)), tuple(heard.texts))  # it names the file
+        return Answer(failure=str(error), warnings=heard.warnings)  # it names the file
     except Exception as error:  # noqa: BLE001 - whatever the reason, one failing square must not stop the others
-        return Answer(Failure(f"{task.label} failed ({error})."), tuple(heard.texts))
+        return Answer(failure=f"{task.label} failed ({error}).", warnings=heard.warnings)
 
 
 def _result(task: Task, inputs: Mapping[Hashable, Any], folder: Path, expected_version: str, progress: Progress) -> Any:
@@ -167,22 +159,16 @@ def _result(task: Task, inputs: Mapping[Hashable, Any], folder: Path, expected_v
             progress.warning(f"{task.label}: the stored result is damaged, so it is computed again.")
             with writing(folder):
                 discard(path)
-    results = {one: load(given) if isinstance(given, Stored) else given for one, given in inputs.items()}
-    result = task.function(*task.arguments, Context(results, _once_of_thread(), progress))
+    results = {one: _loaded(given) for one, given in inputs.items()}
+    result = task.function(*task.arguments, Context(results, _OF_THREAD.once, progress))
     if not can_store(result):
         return result
     save(path, result)
     return Stored(str(path))
 
 
-class _Warnings(Progress):
-    """Keeps the warnings of a task."""
-
-    def __init__(self) -> None:
-        self.texts: list[str] = []
-
-    def warning(self, text: str) -> None:
-        self.texts.append(text)
+def _loaded(result: Any) -> Any:
+    return load(result) if isinstance(result, Stored) else result
 
 
 @lru_cache
@@ -191,18 +177,18 @@ def _sweep_once(folder: str) -> None:
     sweep(Path(folder))
 
 
-_OF_THREAD = threading.local()
-"""What the threads of this worker keep between tasks: engines of OpenCV cannot be shared between threads."""
+class _OfThread(threading.local):
+    """What a thread of this worker keeps between tasks: engines of OpenCV cannot be shared between threads."""
+
+    def __init__(self) -> None:
+        self.once = Once()
 
 
-def _once_of_thread() -> Once:
-    if not hasattr(_OF_THREAD, "once"):
-        _OF_THREAD.once = Once()
-    return _OF_THREAD.once
+_OF_THREAD = _OfThread()
 
 
 def _answer(future: Future, label: str) -> Answer:
-    """Return what a worker has answered, or a `Failure` if its workers died.
+    """Return what a worker has answered, or a failure if its workers died.
 
     Raises
     ------
@@ -212,4 +198,4 @@ def _answer(future: Future, label: str) -> Answer:
     error = future.exception() if future.status == "error" else None
     if isinstance(error, RailExtractError):
         raise error
-    return future.result() if error is None else Answer(Failure(f"{label} was abandoned ({error})."))
+    return future.result() if error is None else Answer(failure=f"{label} was abandoned ({error}).")

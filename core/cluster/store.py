@@ -6,10 +6,13 @@ A file is complete or does not exist: after any interruption, the next run conti
 from __future__ import annotations
 
 import hashlib
+import json
+import math
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from functools import lru_cache
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -19,13 +22,16 @@ from ..disk import writing
 from ..frame import LocalFrame
 from ..frpdf.models import MODELS
 from ..rails import RailLine, Support
-from ..raster import TILE, RailRaster
+from ..raster import RailRaster
 from ..scratch import scratch_folder
 from ..squares.grid import Square
 from ..squares.pieces import SquareRails
 from ..squares.spool import SpooledPoints
 
 CORE = Path(__file__).resolve().parent.parent
+
+KEPT = {one.__name__: one for one in (RailRaster, SquareRails, Square, LocalFrame, RailLine, Support)}
+"""Classes of which results consist, besides numbers, texts, arrays, tuples and mappings."""
 
 
 @dataclass(frozen=True)
@@ -86,26 +92,28 @@ def can_store(result: Any) -> bool:
 
 
 def save(path: Path, result: RailRaster | SquareRails | tuple[RailLine, ...]) -> None:
-    """Write a result.
+    """Write a result, in a temporary folder first: a full disk or a killed worker leaves no incomplete file.
 
     Raises
     ------
     DiskError
     """
-    if isinstance(result, RailRaster):
-        _write(path, _raster_arrays(result))
-    elif isinstance(result, SquareRails):
-        more = {"nodes": result.nodes, "strip_rows": result.strips}
-        _write(path, {**_rail_arrays(result.rails), **_square_arrays(result.square), **more})
-    else:
-        _write(path, _rail_arrays(result))
+    arrays: list[bytes] = []
+    text = json.dumps(_described(result, arrays), default=np.generic.item)
+    with writing(path.parent), scratch_folder(path.parent) as scratch:
+        unfinished = scratch / path.name
+        with unfinished.open("xb") as file:
+            np.savez_compressed(file, text=_bytes(text.encode()), arrays=_bytes(b"".join(arrays)))
+            file.flush()
+            os.fsync(file.fileno())  # otherwise the file may be empty after a power cut
+        unfinished.replace(path)
 
 
 class DamagedError(Exception):
     """A file does not hold what `save` wrote."""
 
 
-def load(stored: Stored) -> RailRaster | SquareRails | tuple[RailLine, ...]:
+def load(stored: Stored) -> Any:
     """Read what `save` wrote.
 
     Raises
@@ -113,103 +121,46 @@ def load(stored: Stored) -> RailRaster | SquareRails | tuple[RailLine, ...]:
     DamagedError
     """
     try:
-        with np.load(stored.path, allow_pickle=False) as arrays:
-            if "bits" in arrays:
-                return _raster(arrays)
-            rails = _rails(arrays)
-            if "nodes" not in arrays:
-                return rails
-            return SquareRails(_square(arrays), rails, arrays["nodes"], arrays["strip_rows"])
+        with np.load(stored.path, allow_pickle=False) as file:
+            return _restored(json.loads(file["text"].tobytes()), BytesIO(file["arrays"].tobytes()))
     except Exception as error:  # damage shows as an error of the file, of the compression or of the arrays
         raise DamagedError(f"{Path(stored.path).name} is damaged ({error})") from error
 
 
-def _raster_arrays(raster: RailRaster) -> dict[str, np.ndarray]:
-    index = np.array(sorted(raster.tiles), dtype=np.int32).reshape(-1, 2)
-    bits = [np.packbits(raster.tiles[place]) for place in sorted(raster.tiles)]
-    return {
-        "index": index,
-        "bits": np.array(bits, dtype=np.uint8).reshape(-1, TILE * TILE // 8),
-        "grid": np.array([raster.cell_m, raster.x0, raster.y0]),
-    }
+def _bytes(content: bytes) -> np.ndarray:
+    return np.frombuffer(content, np.uint8)
 
 
-def _raster(arrays: Mapping[str, np.ndarray]) -> RailRaster:
-    bits = np.unpackbits(arrays["bits"], axis=1).astype(bool).reshape(-1, TILE, TILE)
-    tiles = {(row, column): tile for (row, column), tile in zip(arrays["index"].tolist(), bits)}
-    return RailRaster(tiles, *arrays["grid"].tolist())
+def _described(fact: Any, arrays: list[bytes]) -> Any:
+    """Return a fact as JSON; the bytes of its arrays are appended, and it states their types and shapes in order."""
+    if isinstance(fact, np.ndarray):
+        arrays.append((np.packbits(fact) if fact.dtype == bool else fact).tobytes())
+        return {"array": [str(fact.dtype), fact.shape]}
+    if isinstance(fact, tuple):
+        return {"tuple": [_described(one, arrays) for one in fact]}
+    if isinstance(fact, Mapping):
+        return {"mapping": [[_described(one, arrays) for one in item] for item in fact.items()]}
+    if type(fact) in KEPT.values():
+        return {type(fact).__name__: [_described(getattr(fact, one.name), arrays) for one in fields(fact)]}
+    return fact
 
 
-def _square_arrays(square: Square) -> dict[str, np.ndarray]:
-    frame = square.frame
-    return {
-        "key": np.array(square.key),
-        "frame": np.array([*frame.origin, frame.horizontal_unit_m, frame.vertical_unit_m, square.side_m]),
-        "crs": np.array(frame.crs_wkt or ""),
-    }
+def _restored(fact: Any, arrays: BytesIO) -> Any:
+    """Return what `_described` described."""
+    if not isinstance(fact, dict):
+        return fact
+    ((kind, content),) = fact.items()
+    if kind == "array":
+        return _array(np.dtype(content[0]), content[1], arrays)
+    if kind == "mapping":
+        return {_restored(name, arrays): _restored(value, arrays) for name, value in content}
+    parts = [_restored(one, arrays) for one in content]
+    return tuple(parts) if kind == "tuple" else KEPT[kind](*parts)
 
 
-def _square(arrays: Mapping[str, np.ndarray]) -> Square:
-    column, row = arrays["key"].tolist()
-    *origin, horizontal_m, vertical_m, side_m = arrays["frame"].tolist()
-    frame = LocalFrame(np.array(origin), horizontal_m, vertical_m, str(arrays["crs"]) or None)
-    return Square((column, row), frame, side_m)
-
-
-def _rail_arrays(rails: Sequence[RailLine]) -> dict[str, np.ndarray]:
-    supports = [rail.support or Support(np.empty(0), np.empty(0), np.empty(0)) for rail in rails]
-    figures = [(r.rail_id, r.class_code, r.points, r.resid_mm, r.sigma_mm, r.bridged_m, r.sigmaz_mm) for r in rails]
-    return {
-        "figures": np.array(figures, dtype=float).reshape(-1, 7),
-        **_packed("xyz", [rail.xyz for rail in rails], 3),
-        **_packed("gaps", [rail.gaps for rail in rails], 2),
-        **_packed("support", [np.column_stack([one.t, one.points, one.sigma_m, one.heights_m]) for one in supports], 4),
-        **_packed("strips", [np.empty((0, 3)) if one.strips is None else one.strips for one in supports], 3),
-    }
-
-
-def _rails(arrays: Mapping[str, np.ndarray]) -> tuple[RailLine, ...]:
-    names = ("xyz", "gaps", "support", "strips")
-    return tuple(_rail(*one) for one in zip(arrays["figures"].tolist(), *(_unpacked(arrays, name) for name in names)))
-
-
-def _rail(
-    figures: Sequence[float], xyz: np.ndarray, gaps: np.ndarray, support: np.ndarray, strips: np.ndarray
-) -> RailLine:
-    rail_id, class_code, points, resid_mm, sigma_mm, bridged_m, sigmaz_mm = figures
-    t, shown, sigma_m, sigmaz_m = support.T
-    return RailLine(
-        xyz,
-        int(rail_id),
-        int(class_code),
-        int(points) if points == int(points) else points,  # the points of a whole rail are a count; a piece has a share
-        resid_mm,
-        sigma_mm,
-        bridged_m,
-        gaps,
-        Support(t, shown, sigma_m, strips if len(strips) else None, sigmaz_m) if len(support) else None,
-        sigmaz_mm=sigmaz_mm,
-    )
-
-
-def _packed(name: str, arrays: Sequence[np.ndarray], columns: int) -> dict[str, np.ndarray]:
-    """Concatenate arrays, because a file holds no lists."""
-    whole = np.concatenate(arrays) if arrays else np.empty((0, columns))
-    return {name: whole, f"{name}_counts": np.array([len(one) for one in arrays], dtype=np.int64)}
-
-
-def _unpacked(arrays: Mapping[str, np.ndarray], name: str) -> list[np.ndarray]:
-    """Separate what `_packed` concatenated."""
-    counts = arrays[f"{name}_counts"]
-    return np.split(arrays[name], np.cumsum(counts)[:-1]) if len(counts) else []
-
-
-def _write(path: Path, arrays: Mapping[str, Any]) -> None:
-    """Write arrays in a temporary folder first, so that a full disk or a killed worker leaves no incomplete file."""
-    with writing(path.parent), scratch_folder(path.parent) as scratch:
-        unfinished = scratch / path.name
-        with unfinished.open("xb") as file:
-            np.savez_compressed(file, **arrays)
-            file.flush()
-            os.fsync(file.fileno())  # otherwise the file may be empty after a power cut
-        unfinished.replace(path)
+def _array(dtype: np.dtype, shape: Sequence[int], arrays: BytesIO) -> np.ndarray:
+    """Read the next array."""
+    count = math.prod(shape)
+    if dtype.kind == "b":
+        return np.unpackbits(_bytes(arrays.read(-(-count // 8))), count=count).astype(bool).reshape(shape)
+    return np.frombuffer(arrays.read(count * dtype.itemsize), dtype).reshape(shape).copy()

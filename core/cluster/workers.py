@@ -31,10 +31,7 @@ PAGES = ("distributed.scheduler.http.routes", "distributed.worker.http.routes")
 """Settings of Dask that list the web pages about a run."""
 
 TIMEOUT_S = 20
-"""How long a scheduler may take to answer."""
-
-WORKERS_S = 10
-"""How long a scheduler may have no workers."""
+"""How long a scheduler may take to answer, and to have workers."""
 
 WORKER_BYTES = 3 << 29
 """Memory per local worker: its peak is a gigabyte (docs/scaling.md), and the joining process needs some."""
@@ -133,7 +130,7 @@ def _running(scheduler: str, certificates: Certificates | None) -> Iterator[Clie
         ) from error
     with client:
         try:
-            client.wait_for_workers(1, timeout=WORKERS_S)
+            client.wait_for_workers(1, timeout=TIMEOUT_S)
         except NoAnswer:
             raise RailExtractError(
                 f"The Dask scheduler at {scheduler} has no workers: start some with `dask worker {scheduler}`."

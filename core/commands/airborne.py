@@ -7,45 +7,43 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from ..airborne.files import survey_files
-from ..airborne.proposals import Proposals, propose_guides
+from ..airborne.proposals import propose_guides
 from ..airborne.run import Run
-from ..airborne.survey import Guide, Survey
-from ..clouds.points import Request, ask
+from ..airborne.survey import Survey
 from ..disk import Destination, writing
 from ..errors import ParameterError
+from ..fields import AIRBORNE, PROPOSED
 from ..output.layers import airborne_stations_layer, findings_layer, lines_layer
 from ..parameters import AIRBORNE_CLASSES, AirborneParameters
-from ..products import AIRBORNE, PROPOSED
 from ..progress import Estimating
 from ..report.airborne import airborne_findings, airborne_page, airborne_summary
 from ..scratch import scratch_folder
 from ..standards import RailStandard, resolve
 from .options import (
-    LAYERS,
+    LAYER,
     REPORT,
-    TILES_HELP,
     WRITING,
     Console,
     add_cloud_arguments,
     add_lengths,
+    add_outputs,
+    add_tiles_argument,
     add_workers_argument,
     destinations_of,
-    extent_of,
     lengths_of,
-    limited,
     numbers_in,
+    request_of,
     runner_of,
-    shapes_module,
+    vector_module,
 )
 
-SUFFIXES = {
-    "centerlines": LAYERS,
-    "stations": LAYERS,
-    "findings": LAYERS,
-    "proposed": LAYERS,
-    "report": REPORT,
+OUTPUTS = {
+    "centerlines": (LAYER, "GeoPackage (or .dxf, .csv) for the lines"),
+    "stations": (LAYER, "GeoPackage for a point every 10 m, with what is not seen and why"),
+    "findings": (LAYER, "GeoPackage for the places to look at"),
+    "proposed": (LAYER, "GeoPackage for guides where there are none: lines to correct"),
+    "report": (REPORT, "HTML file for the report"),
 }
-"""File name suffixes of each output."""
 
 LENGTHS = {
     "reach": "largest distance of a track from its guide",
@@ -55,53 +53,42 @@ LENGTHS = {
 """Options in metres, each an attribute of `AirborneParameters` without its unit."""
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments of the command."""
-    parser.add_argument("tiles", nargs="+", type=Path, metavar="TILE", help=TILES_HELP)
+def airborne(parser: argparse.ArgumentParser) -> None:
+    """Declare the command."""
+    add_tiles_argument(parser)
     text = (
         "lines along the tracks, one for each, such as OpenStreetMap has them (GeoPackage, GeoJSON); without it, the "
         "cloud is searched and --proposed written"
     )
     parser.add_argument("--guide", type=Path, metavar="FILE", help=text)
-    output = parser.add_argument_group("outputs", "Existing files are replaced. GeoPackages may be the same file.")
-    output.add_argument("--centerlines", type=Path, help="GeoPackage (or .dxf, .csv) for the lines")
-    output.add_argument(
-        "--stations", type=Path, help="GeoPackage for a point every 10 m, with what is not seen and why"
-    )
-    output.add_argument("--findings", type=Path, help="GeoPackage for the places to look at")
-    output.add_argument("--proposed", type=Path, help="GeoPackage for guides where there are none: lines to correct")
-    output.add_argument("--report", type=Path, help="HTML file for the report")
+    add_outputs(parser, OUTPUTS)
     add_cloud_arguments(parser)
     classes = ",".join(map(str, AIRBORNE_CLASSES))
     parser.add_argument("--classes", default=classes, help=f"classes of the points to use (default: {classes})")
     add_lengths(parser, LENGTHS, AirborneParameters)
     add_workers_argument(parser)
+    parser.set_defaults(run=_run)
 
 
-def run(args: argparse.Namespace) -> None:
-    """Find the tracks and write.
-
-    Raises
-    ------
-    RailExtractError
-        A parameter is wrong, a file can't be read, or an output can't be written.
-    """
+def _run(args: argparse.Namespace) -> None:
+    """Find the tracks and write."""
     standard = resolve(args.standard, args.gauge, args.head_width)
-    parameters = parameters_of(args, standard)
+    parameters = AirborneParameters(standard.gauge_m, standard.head_width_m, **lengths_of(args, LENGTHS))
     progress = Estimating(Console())
     _check_outputs(args)
-    outputs = destinations_of(args, SUFFIXES)
-    codes = numbers_in(args.classes, "--classes", int)
-    request = limited(ask(args.tiles, codes, args.crs, extent_of(args.extent), progress), args)
+    outputs = destinations_of(args, OUTPUTS)
+    request = request_of(args, numbers_in(args.classes, "--classes", int), progress)
     parent = next(iter(outputs.values())).file.parent
     with writing(parent), scratch_folder(parent) as folder, runner_of(args) as runner:
         job = Run(request, parameters, folder / "points", runner, progress)
         if args.guide is None:
             found = propose_guides(job)
         else:
-            survey = survey_files(job, _guides(args.guide, request))
+            guides = vector_module("--guide").read_guides(args.guide, request.zero.crs_wkt)
+            survey = survey_files(job, guides)
     if args.guide is None:
-        _write_proposed(found, outputs["proposed"])
+        layers = [lines_layer(PROPOSED, found.guides)]
+        vector_module("--proposed", WRITING).write_all(layers, outputs, found.frame)
         print(found.summary)
         return
     _write(survey, outputs, args, standard)
@@ -115,40 +102,23 @@ def _check_outputs(args: argparse.Namespace) -> None:
     if getattr(args, wanted) is None:
         ending = "to have guides proposed, or --guide to fit tracks" if args.guide is None else "for the lines"
         raise ParameterError(f"Give --{wanted} {ending}.")
-    for name in SUFFIXES:
+    for name in OUTPUTS:
         if (name == "proposed") == (args.guide is not None) and getattr(args, name) is not None:
             raise ParameterError(
                 f"--{name} is written {'with' if args.guide is None else 'without'} --guide only: leave it out."
             )
 
 
-def _write_proposed(found: Proposals, destination: Destination) -> None:
-    """Write the proposed guides."""
-    module = shapes_module("--proposed", WRITING)
-    module.write_layers([lines_layer(PROPOSED, found.guides)], destination, found.frame)
-
-
-def parameters_of(args: argparse.Namespace, standard: RailStandard) -> AirborneParameters:
-    """Return the parameters that the options state."""
-    return AirborneParameters(standard.gauge_m, standard.head_width_m, **lengths_of(args, LENGTHS))
-
-
-def _guides(path: Path, request: Request) -> list[Guide]:
-    """Read the guides in the coordinate system of the cloud."""
-    return shapes_module("--guide").read_guides(path, request.zero.crs_wkt)
-
-
 def _write(
     survey: Survey, outputs: Mapping[str, Destination], args: argparse.Namespace, standard: RailStandard
 ) -> None:
     """Write the outputs that were asked for; layers of the same file together."""
-    module = shapes_module("--centerlines", WRITING)
     layers = [lines_layer(AIRBORNE, survey.lines)]
     if "stations" in outputs:
         layers.append(airborne_stations_layer(survey.tracks))
     if "findings" in outputs:
         layers.append(findings_layer(airborne_findings(survey)))
-    module.write_all(layers, outputs, survey.frame)
+    vector_module("--centerlines", WRITING).write_all(layers, outputs, survey.frame)
     if "report" in outputs:
         facts = {"Rail": standard.label, "Command": args.command_line}
         outputs["report"].write_text(airborne_page(survey, args.tiles[0].name, facts))

@@ -7,19 +7,18 @@ import math
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import Field as ParameterField
 from dataclasses import fields, replace
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 
-from ..clouds.points import ask
+from ..clouds.readers import Extent
 from ..disk import Destination
 from ..errors import ParameterError, RailExtractError
 from ..frpdf import DEVICES, ENGINES, MAX_PASSES
 from ..frpdf.models import NAMES, choose
 from ..learned.model import weights_for
-from ..output.raster_file import header_for, on_one_grid
+from ..output.raster_file import header_for, on_one_grid, write_rasters
 from ..parameters import DEFAULT_STEP_M, DEFAULT_WORKERS, LEARNED, MAX_WORKERS, STRIPS, Parameters
 from ..pipeline import extract_files
 from ..progress import Estimating, Progress, counted
@@ -30,20 +29,19 @@ from ..standards import SEARCHED_CLASSES, RailStandard, resolve
 from ..tasks import Runner
 from ..workers.runner import workers
 from .options import (
-    LAYERS,
+    LAYER,
     REPORT,
-    TILES_HELP,
     Console,
     add_axis_arguments,
     add_cloud_arguments,
     add_method_arguments,
-    axes_of,
+    add_outputs,
+    add_tiles_argument,
     destinations_of,
-    extent_of,
     gauges_of,
-    limited,
     numbers_in,
-    shapes_module,
+    request_of,
+    vector_module,
 )
 
 LAYER_PACKAGES, RASTER_PACKAGES, CLUSTER_PACKAGES = (
@@ -59,31 +57,19 @@ LAST_PORT = 65_535
 INCOMPLETE = 2
 """Exit code of a run that has written results in which some files or squares are missing."""
 
-SUFFIXES = {
-    "rails": LAYERS,
-    "centerlines": LAYERS,
-    "quality": LAYERS,
-    "findings": LAYERS,
-    "cleaned": (".tif", ".tiff"),
-    "report": REPORT,
+OUTPUTS = {
+    "rails": (LAYER, "GeoPackage (or .dxf, .csv) for the rails"),
+    "centerlines": (LAYER, "GeoPackage for the track centerlines"),
+    "quality": (LAYER, "GeoPackage for the points with the track geometry"),
+    "findings": (LAYER, "GeoPackage for the places to look at"),
+    "cleaned": ((".tif", ".tiff"), "GeoTIFF for the rail raster as the network cleaned it"),
+    "report": (REPORT, "HTML file for the report"),
 }
-"""File name suffixes of each output."""
 
-WITH_OWN_OPTION = (
-    "gauge_m",
-    "head_width_m",
-    "passes",
-    "engine",
-    "device",
-    "model",
-    "other_gauges_m",
-    "other_heads_m",
-    "quality_step_m",
-    "square_tiles",
-    "keep_cleaned",
-    "strips",
+NUMBERS = tuple(
+    one for one in fields(Parameters) if isinstance(one.default, (float, type(None))) and one.name != "quality_step_m"
 )
-"""Parameters that are not declared by `_number_fields`."""
+"""Parameters that are plain numbers, each with an option of its own name."""
 
 POSITIVE = (
     "smoothing_xy_m",
@@ -97,26 +83,17 @@ POSITIVE = (
 """Parameters that can't be 0: nothing is smoothed over no length, and no point is within no distance."""
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments of the command."""
-    parser.add_argument("tiles", nargs="+", type=Path, metavar="TILE", help=TILES_HELP)
-    _add_outputs(parser.add_argument_group("outputs", "Existing files are replaced. GeoPackages may be the same file."))
+def extract(parser: argparse.ArgumentParser) -> None:
+    """Declare the command."""
+    add_tiles_argument(parser)
+    add_outputs(parser, OUTPUTS, required="rails")
     _add_cloud(parser.add_argument_group("point cloud and rails"))
     kilometres = parser.add_argument_group("kilometres", "Fields of --quality and --findings, and in the report.")
     kilometres.add_argument("--axis", metavar="FILE", help="line layer that carries the kilometres")
     add_axis_arguments(kilometres)
     _add_method(parser.add_argument_group("method", "See docs/parameters.md."))
     _add_workers(parser.add_argument_group("workers"))
-
-
-def _add_outputs(group: argparse._ArgumentGroup) -> None:
-    """Declare the files to write."""
-    group.add_argument("--rails", type=Path, required=True, help="GeoPackage (or .dxf, .csv) for the rails")
-    group.add_argument("--centerlines", type=Path, help="GeoPackage for the track centerlines")
-    group.add_argument("--quality", type=Path, help="GeoPackage for the points with the track geometry")
-    group.add_argument("--findings", type=Path, help="GeoPackage for the places to look at")
-    group.add_argument("--cleaned", type=Path, help="GeoTIFF for the rail raster as the network cleaned it")
-    group.add_argument("--report", type=Path, help="HTML file for the report")
+    parser.set_defaults(run=_run)
 
 
 def _add_cloud(group: argparse._ArgumentGroup) -> None:
@@ -139,7 +116,7 @@ def _add_method(group: argparse._ArgumentGroup) -> None:
     group.add_argument("--device", choices=DEVICES, default=Parameters.device, help="where the network runs")
     text = "weights of the network (default: AUTO, by gauge and railhead)"
     group.add_argument("--model", choices=NAMES, default=Parameters.model, help=text)
-    for field in _number_fields():
+    for field in NUMBERS:
         unit = "degrees" if field.name.endswith("_deg") else "metres"
         default = "as the points require" if field.default is None else f"{field.default:g}"
         text = f"{_option(field.name)[2:].replace('-', '_').upper()} in {unit} (default: {default})"
@@ -174,14 +151,8 @@ def _add_workers(group: argparse._ArgumentGroup) -> None:
     )
 
 
-def run(args: argparse.Namespace) -> int:
-    """Extract and write; returns the exit code.
-
-    Raises
-    ------
-    RailExtractError
-        A parameter is wrong, nothing could be extracted, or an output could not be written.
-    """
+def _run(args: argparse.Namespace) -> int:
+    """Extract and write; returns the exit code."""
     needed = [
         *LAYER_PACKAGES,
         *(RASTER_PACKAGES if args.cleaned else ()),
@@ -193,16 +164,17 @@ def run(args: argparse.Namespace) -> int:
     if args.axis and not (args.quality or args.findings or args.report):
         raise ParameterError("--axis gives --quality, --findings and --report kilometres: name at least one of these.")
     standard = resolve(args.standard, args.gauge, args.head_width)
-    parameters = parameters_of(args, standard)
-    outputs = destinations_of(args, SUFFIXES)
+    parameters = _parameters(args, standard)
+    origin = Origin(tuple(args.tiles), standard, parameters.gauges[1:], args.command_line, parameters)
+    outputs = destinations_of(args, OUTPUTS)
     if args.work is not None:
-        return _run_in(args.work, args, standard, parameters, outputs)
+        return _run_in(args.work, args, parameters, origin, outputs)
     # Next to the results, where workers on other computers find it too.
     with scratch_folder(outputs["rails"].file.parent) as folder:
-        return _run_in(folder, args, standard, parameters, outputs)
+        return _run_in(folder, args, parameters, origin, outputs)
 
 
-def parameters_of(args: argparse.Namespace, standard: RailStandard) -> Parameters:
+def _parameters(args: argparse.Namespace, standard: RailStandard) -> Parameters:
     """Return the parameters that the options state.
 
     Raises
@@ -214,12 +186,10 @@ def parameters_of(args: argparse.Namespace, standard: RailStandard) -> Parameter
     """
     choose(standard.gauge_m, standard.head_width_m, args.model)
     gauges = gauges_of(args, standard, args.centerline_tolerance)
-    numbers = {field.name: getattr(args, _option(field.name)[2:].replace("-", "_")) for field in _number_fields()}
+    numbers = {field.name: getattr(args, _option(field.name)[2:].replace("-", "_")) for field in NUMBERS}
     for name, value in {**numbers, "iterations": args.iterations, "step": args.step, "workers": args.workers}.items():
         if value is not None and not (math.isfinite(value) and value >= 0) or (name in POSITIVE and value == 0):
-            raise ParameterError(
-                f"The option {_option(name)} can't be {getattr(args, name, value)}: give a larger number."
-            )
+            raise ParameterError(f"The option {_option(name)} can't be {value}: give a larger number.")
     for name, value, largest in (("iterations", args.iterations, MAX_PASSES), ("workers", args.workers, MAX_WORKERS)):
         if value > largest:
             raise ParameterError(f"The option {_option(name)} can't be {value}: give {largest} or less.")
@@ -241,28 +211,27 @@ def parameters_of(args: argparse.Namespace, standard: RailStandard) -> Parameter
 def _run_in(
     folder: Path,
     args: argparse.Namespace,
-    standard: RailStandard,
     parameters: Parameters,
+    origin: Origin,
     outputs: Mapping[str, Destination],
 ) -> int:
     """Extract with a folder for finished results, then write."""
-    codes, extent = numbers_in(args.rail_classes, "--rail-classes", int), extent_of(args.extent)
+    codes = numbers_in(args.rail_classes, "--rail-classes", int)
     if args.classify and args.seeds is not None:
         raise ParameterError("--classify finds all rails, and --seeds those that are pointed at: give one of them.")
     raw = args.classify or args.seeds is not None
-    codes = SEARCHED_CLASSES if raw else codes
     weights = _weights(args)
     progress = Estimating(Console())
     with _runner(args, folder, progress) as runner:
-        request = ask(args.tiles, codes, args.crs, extent, progress, unreadable=runner.failures)
-        request = limited(request, args)
+        request = request_of(args, SEARCHED_CLASSES if raw else codes, progress, runner.failures)
         request = replace(request, merged=args.merge_classes and not raw)
-        seeds = shapes_module("--seeds").read_seeds(args.seeds, request.zero.crs_wkt) if args.seeds else ()
-        axes = axes_of(args, None, request.zero.crs_wkt)[0] if args.axis else None
+        wkt = request.zero.crs_wkt
+        seeds = vector_module("--seeds").read_seeds(args.seeds, wkt) if args.seeds else ()
+        axes = vector_module("--axis", "kilometres").read_axes(args, None, wkt)[0] if args.axis else None
         network = extract_files(request, folder.resolve(), parameters, runner, progress, args.classify, weights, seeds)
     if axes is not None:
         network = replace(network, geometry=axes.along(network.geometry, network.frame, progress))
-    _write(network, args, standard, parameters, extent, outputs)
+    _write(network, origin, parameters.model, request.extent, outputs)
     for lines, what in ((network.rails, "rail"), (network.centerlines, "centerline")):
         print(f"{counted(len(lines), what)}, {sum(line.length_m for line in lines) / 1000:.3f} km")
     if network.geometry:
@@ -334,12 +303,7 @@ def _certificate_files(args: argparse.Namespace, progress: Progress) -> tuple[Pa
 
 
 def _write(
-    network: RailNetwork,
-    args: argparse.Namespace,
-    standard: RailStandard,
-    parameters: Parameters,
-    extent: tuple[float, float, float, float] | None,
-    outputs: Mapping[str, Destination],
+    network: RailNetwork, origin: Origin, model: str, extent: Extent | None, outputs: Mapping[str, Destination]
 ) -> None:
     """Write all outputs; one that fails does not stop the others.
 
@@ -351,15 +315,14 @@ def _write(
     from ..output.layers import network_layers
     from ..output.writing import by_file, write_layers
 
-    layers = network_layers(network, outputs, parameters.gauges_m)
+    layers = network_layers(network, outputs, origin.gauges_m)
     writers: list[Callable[[], None]] = [
         partial(write_layers, same, file, network.frame) for same, file in by_file(layers, outputs)
     ]
     if "report" in outputs:
-        origin = Origin(tuple(args.tiles), standard, parameters.gauges[1:], args.command_line, parameters)
         writers.append(lambda: outputs["report"].write_text(origin.report(network)))
     if "cleaned" in outputs and any(raster.tiles for raster in network.cleaned):
-        writers.append(lambda: _write_cleaned(network, outputs["cleaned"], standard, extent, parameters.model))
+        writers.append(lambda: _write_cleaned(network, outputs["cleaned"], origin.standard, extent, model))
     errors: list[RailExtractError] = []
     for write in writers:
         try:
@@ -371,24 +334,13 @@ def _write(
 
 
 def _write_cleaned(
-    network: RailNetwork,
-    destination: Destination,
-    standard: RailStandard,
-    extent: tuple[float, float, float, float] | None,
-    model: str,
+    network: RailNetwork, destination: Destination, standard: RailStandard, extent: Extent | None, model: str
 ) -> None:
     """Write the cleaned rasters as Clean Rail Raster does."""
-    from ..output.geotiff import write_rasters
-
     rasters, frame = on_one_grid(network.cleaned, network.frame)
     header = header_for(rasters, network.cleaned_classes, frame, standard, extent, model)
     with destination.replacing() as new:
         write_rasters(new, header, rasters)
-
-
-def _number_fields() -> list[ParameterField]:
-    """List the parameters that are plain numbers, each with an option of its own name."""
-    return [field for field in fields(Parameters) if field.name not in WITH_OWN_OPTION]
 
 
 def _option(name: str) -> str:

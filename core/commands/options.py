@@ -11,12 +11,10 @@ from contextlib import AbstractContextManager
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
-from types import ModuleType
+from typing import Any
 
 from ..alignment.km_text import HECTOMETRES, NOTATIONS
-from ..alignment.placed_axes import PlacedAxes
-from ..alignment.stations import Start
-from ..clouds.points import Request
+from ..clouds.points import Request, ask
 from ..disk import Destination, writing
 from ..errors import ParameterError
 from ..parameters import DEFAULT_WORKERS, GEOMETRY, LEARNED, LEAVE_OUT, MAX_WORKERS, METHODS, Parameters
@@ -25,10 +23,14 @@ from ..standards import DEFAULT, Gauge, RailStandard, read_gauges
 from ..tasks import Runner
 from ..workers.runner import workers
 
-TILES_HELP = (
-    "point clouds, virtual point clouds, folders of tiles, or patterns such as tiles/*.laz; @FILE reads the names, one "
-    "per line, from a file"
-)
+
+def add_tiles_argument(parser: argparse.ArgumentParser) -> None:
+    """Declare the clouds."""
+    text = (
+        "point clouds, virtual point clouds, folders of tiles, or patterns such as tiles/*.laz; @FILE reads the "
+        "names, one per line, from a file"
+    )
+    parser.add_argument("tiles", nargs="+", type=Path, metavar="TILE", help=text)
 
 
 def add_standard_arguments(parser: argparse._ActionsContainer) -> None:
@@ -82,36 +84,21 @@ def add_axis_arguments(parser: argparse._ActionsContainer) -> None:
     parser.add_argument("--format", choices=tuple(NOTATIONS), default=HECTOMETRES, help=text)
 
 
-def axes_of(args: argparse.Namespace, places: str | None, plane: str | None = None) -> tuple[PlacedAxes, str | None]:
-    """Return the axes that the options state, and the coordinate system of their plane.
+LAYER, TABLE, REPORT = (".gpkg", ".dxf", ".csv"), (".gpkg",), (".html", ".htm")
+"""Suffixes of files: of layers, of layers that only a GeoPackage holds, and of reports."""
 
-    Parameters
-    ----------
-    args : Namespace
-    places : str or None
-        Coordinate system of what is to be located.
-    plane : str, optional
-        Coordinate system of the plane; else it is that of the axis, or of the places if the axis is in degrees.
-
-    Raises
-    ------
-    RailExtractError
-        They state no kilometres, or contradict each other.
-    """
-    start = None if args.start_km is None else Start(args.start_km, args.decreasing)
-    return shapes_module("--axis", "features").read_axes(
-        args.axis, start, args.posts, args.post_field, args.jumps, args.format, (plane, places)
-    )
+Outputs = Mapping[str, tuple[Sequence[str], str]]
+"""The files that a command writes, by option: their suffixes, and what to say of them in the help."""
 
 
-LAYERS, REPORT = (".gpkg", ".dxf", ".csv"), (".html", ".htm")
-"""File name suffixes of layers, and of a report."""
+def add_outputs(parser: argparse.ArgumentParser, outputs: Outputs, required: str = "") -> None:
+    """Declare the files to write, of which one may be `required`."""
+    group = parser.add_argument_group("outputs", "Existing files are replaced. GeoPackages may be the same file.")
+    for name, (_, text) in outputs.items():
+        group.add_argument(f"--{name}", type=Path, required=name == required, metavar="FILE", help=text)
 
-WRITING = ".output.writing"
-"""For `shapes_module`: the module that writes vector files."""
 
-
-def destination_of(name: str, path: Path, suffixes: Sequence[str] = LAYERS) -> Destination:
+def destination_of(name: str, path: Path, suffixes: Sequence[str]) -> Destination:
     """Check that the file of the option `name` can be written, and make its folder.
 
     Raises
@@ -121,19 +108,24 @@ def destination_of(name: str, path: Path, suffixes: Sequence[str] = LAYERS) -> D
     """
     if path.suffix.lower() not in suffixes:
         raise ParameterError(f"The option --{name} writes {suffixes[0]} files: give {path.name} this suffix.")
-    with writing(path.parent):
-        path.parent.mkdir(parents=True, exist_ok=True)
+    make_folder_of(path)
     return Destination.at(path)
 
 
-def destinations_of(args: argparse.Namespace, suffixes: Mapping[str, Sequence[str]]) -> dict[str, Destination]:
-    """Check that the outputs can be written, and return the destinations of those that are asked for, by option.
+def make_folder_of(path: Path) -> None:
+    """Make the folder of a file.
 
-    Parameters
-    ----------
-    args : Namespace
-    suffixes : mapping of str to sequence of str
-        Suffixes of the files of each output.
+    Raises
+    ------
+    DiskError
+        It can't be made.
+    """
+    with writing(path.parent):
+        path.parent.mkdir(parents=True, exist_ok=True)
+
+
+def destinations_of(args: argparse.Namespace, outputs: Outputs) -> dict[str, Destination]:
+    """Check that the outputs can be written, and return the destinations of those that are asked for, by option.
 
     Raises
     ------
@@ -141,25 +133,25 @@ def destinations_of(args: argparse.Namespace, suffixes: Mapping[str, Sequence[st
         An output could not be written after the run, or a file that is not a GeoPackage is given for two.
     """
     files: dict[Path, Destination] = {}
-    outputs: dict[str, Destination] = {}
-    for name, own in suffixes.items():
+    found: dict[str, Destination] = {}
+    for name, (suffixes, _) in outputs.items():
         path = getattr(args, name)
         if path is None:
             continue
-        destination = destination_of(name, path, own)
+        destination = destination_of(name, path, suffixes)
         if destination.file in files and path.suffix.lower() != ".gpkg":
             raise ParameterError(f"Only a GeoPackage holds several outputs: give --{name} a file other than {path}.")
-        outputs[name] = files.setdefault(destination.file, destination)
-    return outputs
+        found[name] = files.setdefault(destination.file, destination)
+    return found
 
 
-def shapes_module(option: str, name: str = "shapes") -> ModuleType:
-    """Return the module that reads vector files, or the one that writes them, for an option that names one.
+def vector_module(option: str, name: str = "vectors") -> Any:
+    """Return the module that reads vector files, or another one of this package that needs the same packages.
 
     Raises
     ------
     ParameterError
-        Its packages are not installed.
+        The packages are not installed; `option` is what needs them.
     """
     try:
         return import_module(f".{name}", __package__)
@@ -169,21 +161,24 @@ def shapes_module(option: str, name: str = "shapes") -> ModuleType:
         ) from error
 
 
-def limited(request: Request, args: argparse.Namespace) -> Request:
-    """Limit a request for points to the polygons of `--mask` and the points without the flags of `--leave-out`.
+WRITING = ".output.writing"
+"""For `vector_module`: the module that writes vector files."""
+
+
+def request_of(args: argparse.Namespace, codes: Sequence[int], progress: Progress, failures: Any = None) -> Request:
+    """Return the request for the points of these classes that the options state.
 
     Raises
     ------
-    ParameterError
-        The file has no polygons, or its packages are not installed.
+    RailExtractError
+        A tile can't be read, an option is wrong, or the file of `--mask` has no polygons.
     """
     flags = tuple(word.strip().upper() for word in args.leave_out.split(",") if word.strip())
     if not set(flags) <= set(LEAVE_OUT):
         raise ParameterError(f'--leave-out "{args.leave_out}" should be flags of {", ".join(LEAVE_OUT)}.')
-    request = replace(request, leave_out=flags)
-    if args.mask is None:
-        return request
-    return replace(request, mask=shapes_module("--mask").read_mask(args.mask, request.zero.crs_wkt))
+    request = ask(args.tiles, codes, args.crs, extent_of(args.extent), progress, unreadable=failures)
+    mask = vector_module("--mask").read_mask(args.mask, request.zero.crs_wkt) if args.mask else None
+    return replace(request, leave_out=flags, mask=mask)
 
 
 def gauges_of(args: argparse.Namespace, standard: RailStandard, tolerance_m: float | None = None) -> tuple[Gauge, ...]:

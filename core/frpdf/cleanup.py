@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ..errors import DeviceExhaustedError
@@ -13,6 +15,8 @@ from .engine import Engine
 
 MARGIN = 64
 """Width in cells, per pass, of the frame of context around a raster that was cut out of a larger one."""
+
+NO_CELLS = np.empty((0, 2), dtype=np.int64)
 
 UNTIL_STABLE = 0
 """Number of passes with which a run continues until the result is stable."""
@@ -48,11 +52,14 @@ def clean(raster: RailRaster, engine: Engine, passes: int = DEFAULT_PASSES, prog
     """
     most = max_passes(passes)
     state, output = None, raster
-    laid: dict[int, list[Field]] = {}
+    fields = lay_fields(raster, engine.max_cells)
     for number in range(most):
         step = progress.span(number / most, (number + 1) / most)
         before = output
-        state, output = _run_pass(raster, state, engine, number, laid, step)
+        while (found := _run_pass(raster, state, engine, number, fields, step)) is None:
+            progress.warning(engine.retreat())
+            fields = lay_fields(raster, engine.max_cells)
+        state, output = found
         if passes == UNTIL_STABLE and number > 0 and is_stable(_changed(before, output), output.count()):
             break
     return output
@@ -63,40 +70,28 @@ def _run_pass(
     state: RailRaster | None,
     engine: Engine,
     number: int,
-    laid: dict[int, list[Field]],
+    fields: Sequence[Field],
     progress: Progress,
-) -> tuple[RailRaster, RailRaster]:
-    """Run one pass; return the state of the next pass, and the result if this pass is the last one.
+) -> tuple[RailRaster, RailRaster] | None:
+    """Run a pass, numbered from 0, on fields, given the result of the pass before.
 
-    Parameters
-    ----------
-    raster : RailRaster
-    state : RailRaster, optional
-        Result of the pass before.
-    engine : Engine
-    number : int
-        Number of the pass, from 0.
-    laid : dict of int to list of Field
-        Fields by the engine's `max_cells`, which all passes share; the missing ones are added.
-    progress : Progress
+    Returns the state of the next pass, and the result if this pass is the last one; None, with the memory released, if
+    the device has not enough of it for a field.
     """
-    while True:
-        following, output = _Canvas(raster), _Canvas(raster)
-        if engine.max_cells not in laid:
-            laid[engine.max_cells] = lay_fields(raster, engine.max_cells)
-        fields = laid[engine.max_cells]
-        try:
-            for field, step in zip(fields, progress.split(len(fields))):
-                seen = [raster.read(*piece.window).astype(np.float32) for piece in field.pieces]
-                known = [_state(state, piece) for piece in field.pieces]
-                found = engine.sweep(seen, known, number, field.pieces, step)
-                for piece, probability in zip(field.pieces, found):
-                    following.paint(piece, probability >= FEEDBACK_THRESHOLD, field.inside)
-                    output.paint(piece, probability >= OUTPUT_THRESHOLD, field.inside)
-            return following.raster(), output.raster()
-        except DeviceExhaustedError:
-            pass  # outside this block the error is released, and with it the memory that its frames hold
-        progress.warning(engine.retreat())
+    cells: dict[float, list[np.ndarray]] = {FEEDBACK_THRESHOLD: [NO_CELLS], OUTPUT_THRESHOLD: [NO_CELLS]}
+    try:
+        for field, step in zip(fields, progress.split(len(fields))):
+            seen = [raster.read(*piece.window).astype(np.float32) for piece in field.pieces]
+            known = [_state(state, piece) for piece in field.pieces]
+            found = engine.sweep(seen, known, number, field.pieces, step)
+            for piece, probability in zip(field.pieces, found):
+                for threshold, kept in cells.items():
+                    some = np.argwhere(probability >= threshold) + [piece.row, piece.column]
+                    kept.append(some[field.inside.holds(some)])
+    except DeviceExhaustedError:
+        return None
+    following, output = (raster.with_cells(np.concatenate(kept)) for kept in cells.values())
+    return following, output
 
 
 def _state(state: RailRaster | None, piece: Piece) -> np.ndarray:
@@ -110,29 +105,3 @@ def _changed(before: RailRaster, after: RailRaster) -> int:
     """Count the cells that differ."""
     windows = [(*(TILE * np.array(index)), TILE, TILE) for index in set(before.tiles) | set(after.tiles)]
     return sum(int(np.count_nonzero(before.read(*window) != after.read(*window))) for window in windows)
-
-
-class _Canvas:
-    """A raster under construction, on the grid of another one."""
-
-    def __init__(self, grid: RailRaster) -> None:
-        self._grid = grid
-        self._cells: list[np.ndarray] = []
-
-    def paint(self, piece: Piece, block: np.ndarray, inside: Piece) -> None:
-        """Set the cells of a piece that are inside a rectangle.
-
-        Parameters
-        ----------
-        piece : Piece
-        block : (height, width) bool array
-            Cells of the piece.
-        inside : Piece
-        """
-        cells = np.argwhere(block) + np.array([piece.row, piece.column])
-        self._cells.append(cells[inside.holds(cells)])
-
-    def raster(self) -> RailRaster:
-        """Return the raster."""
-        cells = np.concatenate(self._cells) if self._cells else np.empty((0, 2), dtype=np.int64)
-        return self._grid.with_cells(cells)

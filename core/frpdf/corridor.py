@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from ..raster import RailRaster
+from ..raster import ROW, RailRaster
 
 BLOCK = 16
 """Side in cells of the blocks that form the corridor."""
@@ -15,15 +16,10 @@ GAP = 8
 left to the vectorizer."""
 BESIDE = 1
 """Blocks computed around rail cells and gaps: 0.6 m, further than the network moves a rail."""
-OVERHEAD = 16
-"""Cost of a rectangle beyond its own cells, as the width of a frame in cells: its surroundings are copied."""
 MAX_PIECE_CELLS = 1 << 18
 """Largest number of cells in a rectangle: a layer takes 0.1 s on it, so that a cancel takes effect in time."""
 CONTEXT = 256
 """Width in cells of the frame of context around a field."""
-
-_ROW = 1 << 32
-"""Difference between the numbers of blocks in neighbouring rows."""
 
 
 @dataclass(frozen=True)
@@ -91,15 +87,15 @@ def corridor(raster: RailRaster) -> np.ndarray:
     occupied = np.unique(_numbers(raster.cells() // BLOCK))
     filled = [occupied]
     for down, right in _directions():
-        starts = occupied[np.isin(occupied + down * _ROW + right, occupied, assume_unique=True)]
+        starts = occupied[np.isin(occupied + down * ROW + right, occupied, assume_unique=True)]
         steps = np.arange(1, max(down, abs(right)))[:, None] / max(down, abs(right))
         between = np.rint(steps * [down, right]).astype(np.int64)
-        filled.append((starts[:, None] + between @ [_ROW, 1]).ravel())
+        filled.append((starts[:, None] + between @ [ROW, 1]).ravel())
     around = np.arange(-BESIDE, BESIDE + 1)
-    shifts = (around[:, None] * _ROW + around).ravel()
+    shifts = (around[:, None] * ROW + around).ravel()
     numbers = np.unique((np.unique(np.concatenate(filled))[:, None] + shifts).ravel())
-    rows = (numbers + _ROW // 2) // _ROW
-    return np.column_stack([rows, numbers - rows * _ROW])
+    rows = (numbers + ROW // 2) // ROW
+    return np.column_stack([rows, numbers - rows * ROW])
 
 
 def _directions() -> list[tuple[int, int]]:
@@ -110,7 +106,7 @@ def _directions() -> list[tuple[int, int]]:
 
 
 def _numbers(blocks: np.ndarray) -> np.ndarray:
-    return blocks[:, 0] * _ROW + blocks[:, 1]
+    return blocks[:, 0] * ROW + blocks[:, 1]
 
 
 def _in_cells(blocks: Piece) -> Piece:
@@ -119,29 +115,31 @@ def _in_cells(blocks: Piece) -> Piece:
 
 def _fields(blocks: np.ndarray, most: int) -> list[Piece]:
     """Halve the bounding rectangle of blocks until no part has more than `most` of them."""
-    rectangles, waiting = [], [blocks] if len(blocks) else []
-    while waiting:
-        group = waiting.pop()
-        if len(group) <= most:
-            rectangles.append(_bounds(group))
-        else:
-            waiting += _halves(group)
-    return rectangles
+    return _divided(blocks, lambda group: _halves(group) if len(group) > most else [])
 
 
 def _partition(blocks: np.ndarray, most: int) -> list[Piece]:
     """Divide blocks along rows and columns while that reduces the cost, or their bounding rectangle is too large."""
-    rectangles, waiting = [], [blocks] if len(blocks) else []
-    while waiting:
-        group = waiting.pop()
+
+    def divide(group: np.ndarray) -> list[np.ndarray]:
         bounds = _bounds(group)
         cost, parts = _best_cut(group)
         if cost < _cost(bounds.height, bounds.width):
-            waiting += parts
-        elif bounds.height * bounds.width > most:
-            waiting += _halves(group)
-        else:
-            rectangles.append(bounds)
+            return parts
+        return _halves(group) if bounds.height * bounds.width > most else []
+
+    return _divided(blocks, divide)
+
+
+def _divided(blocks: np.ndarray, divide: Callable[[np.ndarray], list[np.ndarray]]) -> list[Piece]:
+    """Return the bounding rectangles of blocks, (n, 2), divided until nothing more is divided."""
+    rectangles, waiting = [], [blocks] if len(blocks) else []
+    while waiting:
+        group = waiting.pop()
+        parts = divide(group)
+        waiting += parts
+        if not parts:
+            rectangles.append(_bounds(group))
     return rectangles
 
 
@@ -179,5 +177,5 @@ def _best_cut(blocks: np.ndarray) -> tuple[float, list[np.ndarray]]:
 
 
 def _cost(height, width):
-    """Return the cost of a rectangle of blocks in cells, with its frame."""
-    return (height * BLOCK + 2 * OVERHEAD) * (width * BLOCK + 2 * OVERHEAD)
+    """Return the cost of a rectangle of blocks: its surroundings, as wide as a block, are copied."""
+    return (height + 2) * (width + 2)

@@ -13,21 +13,21 @@ from pathlib import Path
 
 import numpy as np
 
-from .folding import Convolution, FoldedLayer, block_side, fold
-from .models import MODELS
-from .weights import load_arrays
+from .architecture import Convolution, FoldedLayer, block_side, fold
+from .models import MODELS, load_arrays
 
 IR_VERSION, OPERATOR_SET = 8, 13
 """Versions that runtimes since 2021 read."""
 
 _VARINT, _BYTES = 0, 2
-_FLOAT, _INT64, _INT_ATTRIBUTE, _INTS_ATTRIBUTE = 1, 7, 2, 7
+_FLOAT, _INT_ATTRIBUTE, _STRING_ATTRIBUTE, _INTS_ATTRIBUTE = 1, 2, 3, 7
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     parser.add_argument("folder", type=Path, help="folder for NAME_pass1.onnx and NAME_pass2.onnx of each model")
     parser.add_argument("--side", type=int, default=512, help="side of the rasters (default 512)")
+    parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> None:
@@ -41,38 +41,28 @@ def run(arguments: argparse.Namespace) -> None:
 
 
 def to_onnx(layers: Sequence[FoldedLayer], height: int, width: int) -> bytes:
-    """Return one pass as ONNX, from `input`, (1, 2, height, width) in -1 to 1, to `logits`, (1, 1, height, width).
+    """Return one pass, of `height` x `width` cells in whole blocks, as an ONNX ModelProto.
 
-    Parameters
-    ----------
-    layers : sequence of FoldedLayer
-        The layers of the pass.
-    height, width : int
-        Size of the rasters, multiples of the side of the network's blocks.
-
-    Returns
-    -------
-    bytes
-        An ONNX ModelProto.
+    It leads from `input`, (1, 2, height, width) in -1 to 1, to `logits`, (1, 1, height, width).
     """
     graph, side = _Graph(), block_side(layers)
-    x = "input" if side == 1 else graph.into_blocks("input", 2, height, width, side)
+    x = "input" if side == 1 else graph.into_blocks("input", 2, side)
     for layer in layers:
         x = graph.layer(layer, x, x, output="logits" if layer.is_output and side == 1 else None)
     if side > 1:
-        graph.from_blocks(x, height, width, side, output="logits")
+        graph.from_blocks(x, side, output="logits")
     return graph.proto({"input": (1, 2, height, width)}, {"logits": (1, 1, height, width)})
 
 
 def layer_to_onnx(layer: FoldedLayer) -> bytes:
-    """Return one layer as ONNX, from `around` and `own`, as `layered.Step.run` takes them, to `found`.
+    """Return one layer as ONNX, from `around` and `own`, as `engine.Step.run` takes them, to `found`.
 
     Arrays are (1, channels, height, width). Only layers with a reduction have the input `own`. The stated shapes are
     those of a single cell; a runtime also takes larger arrays.
     """
     graph = _Graph()
     graph.layer(layer, "around", "own", output="found", padded=False)
-    side = 2 * layer.reach + 1
+    side = 2 * layer.convolution.reach + 1
     channels_out, channels_in = layer.convolution.weight.shape[:2]
     given: dict[str, tuple[int, ...]] = {"around": (1, channels_in, side, side)}
     if layer.reduction:
@@ -88,17 +78,9 @@ class _Graph:
         self._weights: list[bytes] = []
 
     def layer(self, layer: FoldedLayer, around: str, own: str, output: str | None = None, padded: bool = True) -> str:
-        """Add a layer.
+        """Add a layer to what `around` names; its reduction joins the result with `own`.
 
-        Parameters
-        ----------
-        layer : FoldedLayer
-        around, own : str
-            Input of the convolution, and input that is joined with its result.
-        output : str, optional
-            Name of the result.
-        padded : bool
-            Whether the convolution pads its input so that its result has the same size.
+        A padded convolution has a result of the size of its input.
         """
         if layer.is_output:
             return self.convolve(around, layer.convolution, padded, output)
@@ -108,7 +90,9 @@ class _Graph:
         joined = self.join(self.relu(found), own)
         return self.relu(self.convolve(joined, layer.reduction), output)
 
-    def convolve(self, x: str, convolution: Convolution, padded: bool = True, output: str | None = None) -> str:
+    def convolve(
+        self, x: str, convolution: Convolution, padded: bool = True, output: str | None = None, stride: int = 1
+    ) -> str:
         """Add a convolution; see `layer`."""
         number = len(self._nodes)
         names = [x, f"weight{number}", f"bias{number}"]
@@ -117,28 +101,22 @@ class _Graph:
         attributes = (
             _integers("kernel_shape", (side, side)),
             _integers("dilations", (convolution.dilation,) * 2),
+            _integers("strides", (stride,) * 2),
             _integers("pads", (convolution.reach if padded else 0,) * 4),
         )
         return self._node("Conv", names, attributes, output)
 
-    def into_blocks(self, x: str, channels: int, height: int, width: int, side: int) -> str:
-        """Rearrange cells as `folding.into_blocks` does."""
-        rows, columns = height // side, width // side
-        x = self._arrange(x, (channels, rows, side, columns, side), (0, 2, 4, 1, 3))
-        return self._reshape(x, (1, channels * side**2, rows, columns))
+    def into_blocks(self, x: str, channels: int, side: int) -> str:
+        """Rearrange cells as `architecture.into_blocks` does, by a convolution that picks one cell for each channel."""
+        count = channels * side**2
+        picks = np.eye(count, dtype=np.float32).reshape(count, channels, side, side)
+        return self.convolve(x, Convolution(picks, np.zeros(count, dtype=np.float32)), padded=False, stride=side)
 
-    def from_blocks(self, x: str, height: int, width: int, side: int, output: str) -> str:
-        """Rearrange blocks as `folding.from_blocks` does."""
-        x = self._arrange(x, (side, side, height // side, width // side), (2, 0, 3, 1))
-        return self._reshape(x, (1, 1, height, width), output)
-
-    def _arrange(self, x: str, shape: tuple[int, ...], axes: tuple[int, ...]) -> str:
-        return self._node("Transpose", [self._reshape(x, shape)], (_integers("perm", axes),))
-
-    def _reshape(self, x: str, shape: tuple[int, ...], output: str | None = None) -> str:
-        name = f"shape{len(self._nodes)}"
-        self._weights.append(_tensor(name, np.array(shape, dtype=np.int64)))
-        return self._node("Reshape", [x, name], output=output)
+    def from_blocks(self, x: str, side: int, output: str) -> str:
+        """Rearrange blocks as `architecture.from_blocks` does."""
+        mode = _text(1, "mode") + _text(4, "CRD") + _number(20, _STRING_ATTRIBUTE)
+        size = _text(1, "blocksize") + _number(3, side) + _number(20, _INT_ATTRIBUTE)
+        return self._node("DepthToSpace", [x], (mode, size), output)
 
     def relu(self, x: str, output: str | None = None) -> str:
         return self._node("Relu", [x], output=output)
@@ -166,8 +144,7 @@ class _Graph:
 
 def _tensor(name: str, array: np.ndarray) -> bytes:
     dims = b"".join(_number(1, side) for side in array.shape)
-    kind, dtype = (_INT64, "<i8") if array.dtype == np.int64 else (_FLOAT, "<f4")
-    return dims + _number(2, kind) + _text(8, name) + _message(9, np.ascontiguousarray(array, dtype).tobytes())
+    return dims + _number(2, _FLOAT) + _text(8, name) + _message(9, np.ascontiguousarray(array, "<f4").tobytes())
 
 
 def _integers(name: str, values: Iterable[int]) -> bytes:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from threading import local
 
 import numpy as np
 import torch
@@ -11,8 +10,8 @@ from torch import Tensor
 from torch.nn.functional import conv2d
 
 from ..kernels import device_of, pytorch
-from .folding import Convolution, FoldedLayer, block_side, fold
-from .layered import LayeredEngine, Step
+from .architecture import Convolution, FoldedLayer, block_side, fold
+from .engine import Engine, Step
 
 NO_MEMORY = ("DefaultCPUAllocator", "bad_alloc", "could not create a primitive", "could not create a memory object")
 """Words of the `RuntimeError`s that PyTorch and oneDNN raise if the computer has too little memory."""
@@ -20,7 +19,7 @@ FIRST_FAST_HALF, FIRST_BFLOAT16 = (7, 0), (8, 0)
 """CUDA compute capabilities from which every card is faster in float16 than in float32, and supports bfloat16."""
 
 
-class TorchEngine(LayeredEngine):
+class TorchEngine(Engine):
     """PyTorch on the CPU or on CUDA, in bfloat16 or float16 where the device supports it natively."""
 
     library = pytorch()
@@ -31,7 +30,7 @@ class TorchEngine(LayeredEngine):
         Parameters
         ----------
         arrays : dict
-            Weights, from `weights.load_arrays`.
+            Weights, from `models.load_arrays`.
         device : {"AUTO", "CPU", "CUDA"}
         exact : bool
             Compute in float32 on every device.
@@ -41,6 +40,7 @@ class TorchEngine(LayeredEngine):
         ModelError
             There is no CUDA device, or the weights are not those of FRPDF.
         """
+        super().__init__()
         chosen = device_of(device)
         self._folded = fold(arrays)
         self.block = block_side(self._folded[0])
@@ -54,28 +54,22 @@ class TorchEngine(LayeredEngine):
     def _move(self, device: str) -> None:
         self._device = device
         self._dtype = torch.float32 if self._exact else _fast_type(device)
+        self.description = f"PyTorch {torch.__version__}, {device.upper()}, {str(self._dtype).split('.')[-1]}"
         self._passes = [[_step(layer, device, self._dtype) for layer in layers] for layers in self._folded]
-        self._scratch = _Scratch()
-
-    @property
-    def description(self) -> str:
-        """Library, device and number type."""
-        return f"PyTorch {torch.__version__}, {self._device.upper()}, {str(self._dtype).split('.')[-1]}"
 
     def retreat(self) -> str:
         """Compute fewer cells at once, and at last change to the CPU; see `Engine.retreat`."""
-        self._scratch = _Scratch()
-        if self._device == "cuda":
-            torch.cuda.empty_cache()
         try:
             return super().retreat()
         except MemoryError:
             if not self._others:
                 raise
-        sentence = f"{self._place} has too little free memory: continuing on the CPU."
-        self.max_cells = LayeredEngine.max_cells
-        self._move(self._others.pop())
-        return sentence
+            sentence = f"{self._place} has too little free memory: continuing on the CPU."
+            self.max_cells = Engine.max_cells
+            self._move(self._others.pop())
+            return sentence
+        finally:
+            torch.cuda.empty_cache()
 
     @property
     def _place(self) -> str:
@@ -94,23 +88,15 @@ class TorchEngine(LayeredEngine):
     def _load(self, array: np.ndarray) -> Tensor:
         return _channels_last(torch.from_numpy(array).to(self._device, self._dtype))
 
+    def _empty(self, size: int) -> Tensor:
+        return torch.empty(size, dtype=self._dtype, device=self._device)
+
     def _filled(self, outside: Tensor, height: int, width: int) -> Tensor:
-        # New memory costs more than writing into it: the system clears every page first.
-        size = len(outside) * height * width
-        if size > len(self._scratch.tensor):
-            self._scratch.tensor = torch.empty(size, dtype=self._dtype, device=self._device)
-        around = self._scratch.tensor[:size].view(height, width, len(outside)).permute(2, 0, 1)
+        around = self._memory(len(outside) * height * width).view(height, width, len(outside)).permute(2, 0, 1)
         return around.copy_(outside.expand_as(around))
 
     def _probabilities(self, logits: Tensor) -> np.ndarray:
         return torch.sigmoid(logits.float()).cpu().numpy()
-
-
-class _Scratch(local):
-    """Memory of each thread."""
-
-    def __init__(self) -> None:
-        self.tensor = torch.empty(0)
 
 
 def _step(layer: FoldedLayer, device: str, dtype: torch.dtype) -> Step:
@@ -125,7 +111,7 @@ def _step(layer: FoldedLayer, device: str, dtype: torch.dtype) -> Step:
         found.relu_()
         return _joined(found, own, reduction) if reduction else found
 
-    return Step(layer.reach, run)
+    return Step(layer.convolution.reach, run)
 
 
 class _Convolution:

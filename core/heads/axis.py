@@ -14,9 +14,9 @@ from scipy.ndimage import maximum_filter1d
 from ..polyline import interpolate, left_normals
 from ..rails import Support
 from .blunt import WINDOW, Ridge, wander
-from .edges import EDGE_SIGMA_M, STATION_STEP_M, VIEW_STATIONS, find_middles, stations_along
+from .edges import EDGE_SIGMA_M, VIEW_STATIONS, edge_middles
 from .flank import FLANK_TOP_SIGMA_M, Flank, find_flank
-from .head_points import MIN_ON_HEAD, HeadPoints
+from .head_points import MIN_ON_HEAD, STATION_STEP_M, HeadPoints
 from .level import robust_sigma
 from .roads import MIN_WIDER_M, bands, hidden_edges
 from .sections import Middles, outline_middles
@@ -52,7 +52,7 @@ class Shown:
     Attributes
     ----------
     t : float
-        Chainage, see `edges.stations_along`.
+        Chainage, see `HeadPoints.stations`.
     points : int
         Points on top that are nearest to the station.
     offset_m, information : float
@@ -139,15 +139,10 @@ class Axis:
         return support if marked else _with_blur(support, self.shown.outline.blur, self.shown.outline.blur_up)
 
 
-def _counted(t: np.ndarray, count: int, values: np.ndarray | None = None) -> np.ndarray:
-    """Count points, or sum up their values, by the nearest of `count` stations."""
-    return np.bincount(np.minimum((t / STATION_STEP_M).astype(int), count - 1), values, minlength=count)
-
-
-def _means(t: np.ndarray, across: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+def _means(points: HeadPoints) -> tuple[np.ndarray, np.ndarray]:
     """Return the number of points at each station, and the mean of their offsets; 0 without points."""
-    points = _counted(t, count)
-    return points, _counted(t, count, across) / np.maximum(points, 1)
+    count = points.per_station()
+    return count, points.per_station(points.across) / np.maximum(count, 1)
 
 
 def _of_ridge(points: HeadPoints, ridge: Ridge) -> Shown:
@@ -156,8 +151,8 @@ def _of_ridge(points: HeadPoints, ridge: Ridge) -> Shown:
     places, normals = (interpolate(values, points.along, ridge.t) for values in (line, left_normals(line)))
     shared_m = wander(places + ridge.course_m[:, None] * normals)
     information = ridge.information / (1 + ridge.information * WINDOW * shared_m**2)
-    outline, count = Middles.unknown(len(ridge.t)), _counted(points.t, len(ridge.t))
-    return Shown(ridge.t, count, ridge.offset_m, information, np.zeros(len(ridge.t)), outline)
+    outline = Middles.unknown(len(ridge.t))
+    return Shown(ridge.t, points.per_station(), ridge.offset_m, information, np.zeros(len(ridge.t)), outline)
 
 
 def _is_narrow(points: HeadPoints) -> bool:
@@ -170,8 +165,8 @@ def _is_narrow(points: HeadPoints) -> bool:
 
 def _of_band(points: HeadPoints, left_m: float, sigma_m: float) -> Shown:
     """Return what points show that are all on one face, or on the axis; the axis is at `left_m` on average."""
-    stations, across = stations_along(points.length_m), points.across
-    count, mean_m = _means(points.t, across, len(stations))
+    stations, across = points.stations, points.across
+    count, mean_m = _means(points)
     noise_m = robust_sigma(across - np.interp(points.t, stations[count > 0], mean_m[count > 0]))
     offset_m, common_m = mean_m + left_m - np.median(across), np.full(len(stations), sigma_m)
     return Shown(stations, count, offset_m, count / noise_m**2, common_m, Middles.unknown(len(stations)))
@@ -179,14 +174,12 @@ def _of_band(points: HeadPoints, left_m: float, sigma_m: float) -> Shown:
 
 def _of_head(points: HeadPoints, unseen_m: float, by_outline: bool) -> Shown:
     """Return what points show of a head: its outline, else its edges, else the mean of the points on top."""
-    (top, noise_m), (stations, counts, wide_counts) = points.top, points.histograms
+    stations, top = points.stations, points[points.top[0]]
+    on_head, mean_m = _means(top[top.within(0.5)])
     free = points.free & ~hidden_edges(points)
-    count = _counted(points.t[top], len(stations))
-    head = points[top & points.within(0.5)]
-    on_head, mean_m = _means(head.t, head.across, len(stations))
-    found = find_middles(counts, wide_counts, count, free, points.width_m, noise_m)
-    shown, either_end_m = _is_shown(on_head), _either_end(wide_counts, points.width_m)
-    by_edges = np.isfinite(found.offset_m)
+    edge_m, edge_information = edge_middles(points, free)
+    shown, either_end_m = _is_shown(on_head), _either_end(points)
+    by_edges = np.isfinite(edge_m)
     seen, one_head = by_edges & shown, (by_edges | (either_end_m == 0)) & free.all(axis=0)
     outline = Middles.unknown(len(stations))
     if by_outline:
@@ -197,9 +190,9 @@ def _of_head(points: HeadPoints, unseen_m: float, by_outline: bool) -> Shown:
     by_mean = np.full(len(stations), STATION_STEP_M / unseen_m**2)
     return Shown(
         stations,
-        count,
-        np.select(which, [outline.offset, found.offset_m, mean_m]),
-        np.select(which, [outline.information, found.information, by_mean]),
+        top.per_station(),
+        np.select(which, [outline.offset, edge_m, mean_m]),
+        np.select(which, [outline.information, edge_information, by_mean]),
         np.select(which, [outline.common, EDGE_SIGMA_M, unsure_m]),
         outline,
     )
@@ -211,13 +204,13 @@ def _is_shown(points: np.ndarray) -> np.ndarray:
     return points >= SHOWN_SHARE * usual
 
 
-def _either_end(counts: np.ndarray, head_width_m: float) -> np.ndarray:
+def _either_end(points: HeadPoints) -> np.ndarray:
     """Estimate by how much the middle of a band of points that is wider than a head may be off the head, (s,) metres.
 
     Road next to a grooved rail is as high as its head, which may be at either end of the band.
     """
-    right_m, left_m = bands(counts, head_width_m)
-    wider_m = left_m - right_m - head_width_m
+    right_m, left_m = bands(points)
+    wider_m = left_m - right_m - points.width_m
     return np.where(wider_m > MIN_WIDER_M, 0.5 * wider_m, 0.0)
 
 

@@ -13,7 +13,6 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from ..polyline import left_normals
-from .edges import STATION_STEP_M, station_count, stations_along
 from .head_points import HeadPoints, near_lines
 from .level import OFF_TOP_SIGMAS, SLOPE_ROUNDS, robust_sigma, rough_level
 
@@ -53,7 +52,7 @@ class Ridge:
     Attributes
     ----------
     t : (s,) array
-        Equidistant chainages, see `edges.stations_along`.
+        Equidistant chainages, see `HeadPoints.stations`.
     offset_m, information : (s,) arrays
         Offset of the crest to the left of the line that the points next to a station alone show, and the inverse of its
         variance by the noise of single points, 1/m²; 0 where no points are near.
@@ -74,8 +73,8 @@ class Ridge:
         """Fit one parabola, and a crest for each window, to the points of a line; None if its head is not blunt."""
         if not points.is_blended:
             return None
-        rows, near = station_count(points.length_m), points[points.within(REACH_HEADS)]
-        row = np.minimum((near.t / STATION_STEP_M).astype(int), rows - 1)
+        near = points[points.within(REACH_HEADS)]
+        row, rows = near.station, len(near.stations)
         x, up = near.across, near.z - rough_level(near.t, near.z)
         used = np.ones(len(x), dtype=bool)
         for _ in range(SLOPE_ROUNDS):
@@ -84,7 +83,7 @@ class Ridge:
             noise_m = robust_sigma(flat[used])
             level, slope, crest, information = _crests(row[used], rows, x[used], flat[used], bend, noise_m)
             used = np.abs(flat - level[row] - slope[row] * x) <= OFF_TOP_SIGMAS * noise_m
-        return cls(stations_along(points.length_m), crest, information)
+        return cls(near.stations, crest, information)
 
 
 def _crests(

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..lines.ends import ARC, STRAIGHT, PartingLaw, left_of
 from ..lines.network import LineNetwork
-from ..lines.parting import ARC, STRAIGHT, PartingLaw, left_of
 from ..polyline import length_along, project
 from .head_points import HeadPoints
 

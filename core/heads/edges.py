@@ -6,26 +6,11 @@ See docs/method.md section 6.2.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Union
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d, uniform_filter1d
+from scipy.ndimage import uniform_filter1d
 
-STATION_STEP_M = 0.25
-"""Spacing of the stations along a line, the centres of the windows: a third of the smoothing's sigma."""
-
-WINDOWS = (5, 9, 17, 33)
-"""Lengths of the windows in stations, 1.25 to 8.25 m: the shortest one with enough points is used."""
-
-ENOUGH_POINTS = 80
-"""Points on top that a window should contain: they give the middle to 2 mm before smoothing."""
-
-HALF_HEAD_BINS = 18
-"""Bins across half a head: about 2 mm each, finer than the noise of any cloud."""
-
-BLUR_BINS = 1.5
-"""Sigma of the blur across the line: without it the best position would jump where there are fewer points than bins.
-The edges stay sharp to 3 mm."""
+from .head_points import BLUR_BINS, HALF_HEAD_BINS, HALF_RANGE_BINS, HeadPoints
 
 MAX_SHIFT_BINS = 15
 """Largest shift of a line, about 3 cm: half a cell of the raster and a little noise."""
@@ -54,9 +39,6 @@ VIEW_STATIONS = 161
 """Stations, 40 m, over which the excess is averaged: a scanner on a train keeps its view, and 60 points give the excess
 to 20 % only."""
 
-HALF_RANGE_BINS = HALF_HEAD_BINS + MAX_SHIFT_BINS + 2 + BLURRED_BINS + RIM_BINS
-"""Bins on either side of a line that these steps need."""
-
 EDGE_SIGMA_M = 0.0012
 """Standard error of the middle between edges that more points would not reduce: how much of the corners is seen depends
 on the view. Seen from above a track, the left and the right corner differ by 1.7 mm."""
@@ -65,122 +47,32 @@ EDGE_ROUNDS = 2
 """The first round finds out how the scanner sees the head, the second uses the edges that count."""
 
 
-Widths = Union[float, np.ndarray]
-"""Width of the heads of all lines, or of each line, (n,) metres."""
+def edge_middles(points: HeadPoints, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Find the middle between the edges of a head at its stations.
 
-
-def widest(head_width_m: Widths) -> float:
-    """Return the width of the widest head."""
-    return float(np.max(head_width_m, initial=0.0))
-
-
-def search_distance(head_width_m: float) -> float:
-    """Return the distance from a line up to which points are used, metres."""
-    return HALF_RANGE_BINS * head_width_m / (2 * HALF_HEAD_BINS)
-
-
-def station_count(length_m: float) -> int:
-    """Return the number of stations along a line."""
-    return int(length_m / STATION_STEP_M) + 1
-
-
-def stations_along(length_m: float) -> np.ndarray:
-    """Return the chainages of the stations along a line, (s,) metres."""
-    return (np.arange(station_count(length_m)) + 0.5) * STATION_STEP_M
-
-
-def histograms(
-    t: np.ndarray, across: np.ndarray, length_m: float, head_width_m: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Count points by their offset from the line, in windows along it.
+    The densities come from the long windows, because the scanner's view of the head changes slowly along the line.
 
     Parameters
     ----------
-    t, across : (n,) arrays
-        Chainage of the points and offset to the left of the line, metres.
-    length_m : float
-        Length of the line.
-    head_width_m : float
+    points : HeadPoints
+    free : (2, s) bool array
+        Where the right and the left edge can be seen.
 
     Returns
     -------
-    stations : (s,) array
-        Centres of the windows, metres.
-    counts, wide_counts : (s, 2 HALF_RANGE_BINS) arrays
-        Counts in the shortest window with enough points, and in the longest window. A bin is 1 / (2 HALF_HEAD_BINS) of
-        a head wide; the first half of them is to the right of the line.
-    """
-    rows = station_count(length_m)
-    row = np.minimum((t / STATION_STEP_M).astype(int), rows - 1)
-    column = np.floor(across * (2 * HALF_HEAD_BINS / head_width_m)).astype(int) + HALF_RANGE_BINS
-    inside = (column >= 0) & (column < 2 * HALF_RANGE_BINS)
-    counts = np.bincount(row[inside] * 2 * HALF_RANGE_BINS + column[inside], minlength=rows * 2 * HALF_RANGE_BINS)
-    counts = gaussian_filter1d(counts.reshape(rows, -1).astype(np.float32), BLUR_BINS, axis=1, mode="constant")
-    windows = [uniform_filter1d(counts, size, axis=0, mode="constant") * size for size in WINDOWS]
-    chosen = windows[-1].copy()
-    for window in windows[-2::-1]:
-        enough = window.sum(axis=1) >= ENOUGH_POINTS
-        chosen[enough] = window[enough]
-    return stations_along(length_m), chosen, windows[-1]
-
-
-def middles(counts: np.ndarray, wide_counts: np.ndarray, free: np.ndarray) -> np.ndarray:
-    """Return the offset of the head's middle in each window, (s,) in bins to the left; NaN where no edges are visible.
-
-    The densities come from the wide windows, because the scanner's view of the head changes slowly along the line.
-
-    Parameters
-    ----------
-    counts, wide_counts : (s, 2 HALF_RANGE_BINS) arrays
-        See `histograms`.
-    free : (2, s) bool array
-        See `neighbours.free_edges`.
-    """
-    return CrossSections.of(wide_counts).find_edges(free).middles_in(counts, wide_counts)
-
-
-@dataclass(frozen=True)
-class EdgeMiddles:
-    """The middle between the edges of a head at s stations, NaN where no edges are visible.
-
-    Attributes
-    ----------
     offset_m : (s,) array
-        Metres to the left of the line.
+        Metres to the left of the line; NaN where no edges are visible.
     information : (s,) array
         Inverse of its variance that the points next to a station alone contribute, 1/m².
     """
-
-    offset_m: np.ndarray
-    information: np.ndarray
-
-
-def find_middles(
-    counts: np.ndarray,
-    wide_counts: np.ndarray,
-    points: np.ndarray,
-    free: np.ndarray,
-    head_width_m: float,
-    noise_m: float,
-) -> EdgeMiddles:
-    """Find the middle between the edges at each station.
-
-    Parameters
-    ----------
-    counts, wide_counts : (s, 2 HALF_RANGE_BINS) arrays
-        See `histograms`.
-    points : (s,) array
-        Points on top that are nearest to the stations.
-    free : (2, s) bool array
-        See `neighbours.free_edges`.
-    head_width_m : float
-    noise_m : float
-    """
-    sections, bin_m = CrossSections.of(wide_counts), head_width_m / (2 * HALF_HEAD_BINS)
-    edges = sections.find_edges(free)
-    density = edges.density * (points / np.maximum(wide_counts.sum(axis=1), 1)) / bin_m
-    information = _information(density, edges.weight, noise_m, BLUR_BINS * bin_m)
-    return EdgeMiddles(edges.middles_in(counts, wide_counts) * bin_m, information)
+    (top, noise_m), (counts, wide_counts) = points.top, points.histograms
+    bin_m, wide = points.width_m / (2 * HALF_HEAD_BINS), np.maximum(wide_counts.sum(axis=1), 1)
+    edges = CrossSections.of(wide_counts).find_edges(free)
+    own = replace(edges, density=edges.density * (counts.sum(axis=1) / wide))
+    middle = CrossSections.of(counts).middles(own) + edges.inset
+    middle = np.where(edges.seen & (np.abs(middle) < MAX_SHIFT_BINS), middle, np.nan)
+    density = edges.density * (points[top].per_station() / wide) / bin_m
+    return middle * bin_m, _information(density, edges.weight, noise_m, BLUR_BINS * bin_m)
 
 
 def _information(density: np.ndarray, weight: np.ndarray, noise_m: float, blur_m: float) -> np.ndarray:
@@ -227,12 +119,6 @@ class Edges:
     def initial(cls, free: np.ndarray) -> Edges:
         """Return equal weights for all edges that are `free`, (2, s) bool: those of the first round."""
         return cls(np.ones(free.shape), free.astype(float), free[0] | free[1], np.zeros(free.shape[1]))
-
-    def middles_in(self, counts: np.ndarray, wide_counts: np.ndarray) -> np.ndarray:
-        """Find the middle in narrower windows than the edges were found in, (s,); NaN where no edges are visible."""
-        share = counts.sum(axis=1) / np.maximum(wide_counts.sum(axis=1), 1)
-        middle = CrossSections.of(counts).middles(replace(self, density=self.density * share)) + self.inset
-        return np.where(self.seen & (np.abs(middle) < MAX_SHIFT_BINS), middle, np.nan)
 
 
 @dataclass(frozen=True)

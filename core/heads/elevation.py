@@ -20,8 +20,7 @@ from ..progress import SILENT, Progress
 from ..rails import RailLine, Support
 from .axis import CELL_M, Axis, unseen_m
 from .blunt import SMOOTHING_M, wander
-from .edges import Widths, stations_along
-from .head_points import HeadPoints, near_lines
+from .head_points import HeadPoints, Widths, near_lines, stations_along
 from .level import rough_level
 from .own_level import on_own_level
 from .smoother import KNOT_M

@@ -1,6 +1,6 @@
 """The points along a line: everything about the head of the line is measured from them.
 
-See docs/method.md section 6.1.
+See docs/method.md sections 6.1 and 6.2.
 """
 
 from __future__ import annotations
@@ -8,14 +8,41 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Union
 
 import numpy as np
+from scipy.ndimage import gaussian_filter1d, uniform_filter1d
+from scipy.spatial import cKDTree
 
-from ..polyline import length_along, project
+from ..polyline import interpolate, left_normals, length_along, project
 from ..progress import SILENT, Progress
-from .edges import Widths, histograms, search_distance, widest
 from .level import AXIS_SHARE, MIN_NOISE_M, OFF_TOP_SIGMAS, cross_slope, robust_sigma, rough_level
-from .neighbours import free_edges
+
+STATION_STEP_M = 0.25
+"""Spacing of the stations along a line, the centres of the windows: a third of the smoothing's sigma."""
+
+WINDOWS = (5, 9, 17, 33)
+"""Lengths of the windows in stations, 1.25 to 8.25 m: the shortest one with enough points is used."""
+
+ENOUGH_POINTS = 80
+"""Points on top that a window should contain: they give the middle to 2 mm before smoothing."""
+
+HALF_HEAD_BINS, HALF_RANGE_BINS = 18, 47
+"""Bins across half a head, about 2 mm each, finer than the noise of any cloud; and on either side of a line, for a head
+that is 15 bins off, and what is next to its edge."""
+
+BLUR_BINS = 1.5
+"""Sigma of the blur across the line: without it the best position would jump where there are fewer points than bins.
+The edges stay sharp to 3 mm."""
+
+BESIDE_HEADS = 1.5
+"""Distance of two axes, in head widths, from which the ground between the heads is wide enough to show their edges."""
+
+CROSSED_M = 0.01
+"""Offset on both sides of a line from which another line crosses it; less may be the error of the lines."""
+
+MIN_RUN = 0.5
+"""Cosine of the crossing angle below which each line hides the other for less than one window."""
 
 MIN_ON_HEAD = 80
 """Points needed on a head to find its top; fewer do not determine a slope."""
@@ -40,6 +67,19 @@ blurred."""
 SHOULDER_SHARE = 0.2
 """Points per width on either shoulder, as a share of those on the crown, from which a blurred head goes on there."""
 
+Widths = Union[float, np.ndarray]
+"""Width of the heads of all lines, or of each line, (n,) metres."""
+
+
+def widest(head_width_m: Widths) -> float:
+    """Return the width of the widest head."""
+    return float(np.max(head_width_m, initial=0.0))
+
+
+def stations_along(length_m: float) -> np.ndarray:
+    """Return the chainages of the stations along a line, (s,) metres."""
+    return (np.arange(int(length_m / STATION_STEP_M) + 1) + 0.5) * STATION_STEP_M
+
 
 @dataclass(frozen=True)
 class HeadPoints:
@@ -53,7 +93,7 @@ class HeadPoints:
         Width of the head.
     line : (k, 2) array
     free : (2, s) bool array
-        Where the right and the left edge of the head are free of other heads; see `neighbours.free_edges`.
+        Where the right and the left edge of the head are free of other heads; see `free_edges`.
     strips : (n,) int array or None
         See `RailPoints`.
     """
@@ -79,6 +119,20 @@ class HeadPoints:
     def length_m(self) -> float:
         """Length of the line."""
         return float(self.along[-1])
+
+    @cached_property
+    def stations(self) -> np.ndarray:
+        """Chainage of the stations, (s,)."""
+        return stations_along(self.length_m)
+
+    @cached_property
+    def station(self) -> np.ndarray:
+        """Number of the station next to each point, (n,)."""
+        return np.minimum((self.t / STATION_STEP_M).astype(int), len(self.stations) - 1)
+
+    def per_station(self, values: np.ndarray | None = None) -> np.ndarray:
+        """Count the points next to each station, or sum up values of theirs, (n,): (s,)."""
+        return np.bincount(self.station, values, len(self.stations))
 
     def within(self, share: float) -> np.ndarray:
         """Return which points are this close to the line, in head widths, (n,) bool."""
@@ -121,10 +175,24 @@ class HeadPoints:
         return (flat >= lowest) & (flat <= highest), noise
 
     @cached_property
-    def histograms(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """See `edges.histograms`: of the points on top."""
-        top, _ = self.top
-        return histograms(self.t[top], self.across[top], self.length_m, self.width_m)
+    def histograms(self) -> tuple[np.ndarray, np.ndarray]:
+        """Counts of the points on top by their offset from the line, (s, 2 HALF_RANGE_BINS), in windows along it.
+
+        The first are those in the shortest window with enough points, the second in the longest window. The first half
+        of the bins is to the right of the line.
+        """
+        top, bins = self[self.top[0]], 2 * HALF_RANGE_BINS
+        column = np.floor(top.across * (2 * HALF_HEAD_BINS / self.width_m)).astype(int) + HALF_RANGE_BINS
+        inside = (column >= 0) & (column < bins)
+        counts = np.bincount(top.station[inside] * bins + column[inside], minlength=len(self.stations) * bins)
+        counts = counts.reshape(-1, bins).astype(np.float32)
+        counts = gaussian_filter1d(counts, BLUR_BINS, axis=1, mode="constant")
+        windows = [uniform_filter1d(counts, size, axis=0, mode="constant") * size for size in WINDOWS]
+        chosen = windows[-1].copy()
+        for window in windows[-2::-1]:
+            enough = window.sum(axis=1) >= ENOUGH_POINTS
+            chosen[enough] = window[enough]
+        return chosen, windows[-1]
 
     def in_frame(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the points in the frame of their head: offset to the left and height, (n,), from the top on the line.
@@ -166,7 +234,7 @@ def near_lines(
         See `RailPoints`.
     progress : Progress
     """
-    feet = project(lines, xyz[:, :2], search_distance(widest(widths)), progress)
+    feet = project(lines, xyz[:, :2], HALF_RANGE_BINS / (2 * HALF_HEAD_BINS) * widest(widths), progress)
     free = free_edges(lines, widest(widths))
     z, own = xyz[feet.point, 2], None if strips is None else strips[feet.point]
     heads = []
@@ -175,3 +243,66 @@ def near_lines(
         strip = None if own is None else own[mine]
         heads.append(HeadPoints(feet.t[mine], feet.across[mine], z[mine], width_m, lines[number], free[number], strip))
     return heads
+
+
+def free_edges(lines: Sequence[np.ndarray], head_width_m: float) -> list[np.ndarray]:
+    """Find the stations of each line where the right and the left edge of its head are free of other heads.
+
+    Where a branch leaves its stock rail the heads overlap, and only the outer edge of each is free.
+
+    Parameters
+    ----------
+    lines : sequence of (n, 2) arrays
+    head_width_m : float
+
+    Returns
+    -------
+    list of (2, s) bool arrays
+        For each line, the right and the left edges at its stations.
+    """
+    free = [np.ones((2, len(stations_along(length_along(line)[-1]))), dtype=bool) for line in lines]
+    for line, station, across in _close_runs(lines, BESIDE_HEADS * head_width_m):
+        crossing = across.min() < -CROSSED_M and across.max() > CROSSED_M
+        side = across if crossing else np.full(len(across), across.sum())
+        overlap = crossing & (np.abs(across) < 0.5 * head_width_m)
+        free[line][0, station[(side < 0) | overlap]] = False
+        free[line][1, station[(side >= 0) | overlap]] = False
+    return free
+
+
+def _close_runs(lines: Sequence[np.ndarray], reach_m: float) -> list[tuple[int, np.ndarray, np.ndarray]]:
+    """List where another line is close: line, its stations, and the offsets of the other line to the left, (k,)."""
+    number, station, places, normals = _stations(lines)
+    if not len(number):
+        return []
+    pairs = cKDTree(places).query_pairs(np.hypot(reach_m, 0.5 * STATION_STEP_M), output_type="ndarray")
+    pairs = pairs[number[pairs[:, 0]] != number[pairs[:, 1]]]
+    own, other = np.concatenate([pairs, pairs[:, ::-1]]).T
+    across = _offset(places[other] - places[own], normals[own], normals[other])
+    close = np.abs(across) <= reach_m
+    own, other, across = own[close], number[other[close]], across[close]
+    order = np.lexsort((own, other, number[own]))
+    own, other, across = own[order], other[order], across[order]
+    breaks = np.flatnonzero((np.diff(other) != 0) | (np.diff(own) > 1) | (np.diff(number[own]) != 0)) + 1
+    runs = np.split(np.arange(len(own)), breaks) if len(own) else []
+    return [(int(number[own[run[0]]]), station[own[run]], across[run]) for run in runs]
+
+
+def _offset(step: np.ndarray, normal: np.ndarray, other_normal: np.ndarray) -> np.ndarray:
+    """Return the offsets to the left of straight lines, (k,), given the `step` to a place on each and the normals."""
+    tangent, other_tangent = (values @ np.array([[0.0, -1.0], [1.0, 0.0]]) for values in (normal, other_normal))
+    ahead, across = (np.einsum("ij,ij->i", step, axis) for axis in (tangent, normal))
+    run, rise = (np.einsum("ij,ij->i", other_tangent, axis) for axis in (tangent, normal))
+    return across - ahead * rise / np.where(np.abs(run) > MIN_RUN, run, np.inf)
+
+
+def _stations(lines: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return line and station numbers, (k,), places and unit vectors to the left, (k, 2), of all stations."""
+    columns = [(np.empty(0, int), np.empty(0, int), np.empty((0, 2)), np.empty((0, 2)))]
+    for number, line in enumerate(lines):
+        along = length_along(line)
+        at = np.minimum(stations_along(along[-1]), along[-1])
+        places, normals = interpolate(line, along, at), interpolate(left_normals(line), along, at)
+        columns.append((np.full(len(at), number), np.arange(len(at)), places, normals))
+    numbers, stations, places, normals = (np.concatenate(column) for column in zip(*columns))
+    return numbers, stations, places, normals

@@ -12,14 +12,13 @@ import numpy as np
 
 from ..clouds.points import RailPoints
 from ..lines.network import LineNetwork
-from ..lines.network_smoothing import bend_through
+from ..lines.smoothing import bend_through
 from ..parameters import Parameters
 from ..polyline import left_normals, length_along, project
 from ..progress import SILENT, Progress
 from .axis import CELL_M, Axis, unseen_m
 from .branch_starts import slide_branches
-from .edges import Widths, widest
-from .head_points import near_lines
+from .head_points import Widths, near_lines, widest
 from .own_level import on_own_level
 from .strips import measure_strips
 

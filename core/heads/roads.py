@@ -14,8 +14,7 @@ from scipy.ndimage import binary_opening
 
 from ..lines.smoothing import smooth_profile
 from ..polyline import interpolate, left_normals, project
-from .edges import HALF_HEAD_BINS, HALF_RANGE_BINS, STATION_STEP_M
-from .head_points import HeadPoints, near_lines
+from .head_points import HALF_HEAD_BINS, HALF_RANGE_BINS, STATION_STEP_M, HeadPoints, near_lines
 from .own_level import on_own_level
 
 BAND = (0.02, 0.98)
@@ -41,20 +40,16 @@ PLACE_M = 1.0
 """Spacing of the places at which the distance of two rails is measured."""
 
 
-def bands(counts: np.ndarray, head_width_m: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return the ends of the band of points around a line, (s,) metres to the left: the right one and the left one.
+def bands(points: HeadPoints, window: int = -1) -> tuple[np.ndarray, np.ndarray]:
+    """Return the right and the left end of the band of points around a line, (s,) metres to the left.
 
-    Parameters
-    ----------
-    counts : (s, 2 HALF_RANGE_BINS) array
-        See `edges.histograms`.
-    head_width_m : float
+    `window` is the number of the `HeadPoints.histograms`.
     """
-    sums = np.cumsum(counts, axis=1)
+    sums = np.cumsum(points.histograms[window], axis=1)
     whole = np.maximum(sums[:, -1:], 1e-9)
     first, last = (np.argmax(sums >= part * whole, axis=1) for part in BAND)
     cut = (last - first + 1) * BAND[0] / (BAND[1] - BAND[0])
-    bin_m = head_width_m / (2 * HALF_HEAD_BINS)
+    bin_m = points.width_m / (2 * HALF_HEAD_BINS)
     return (first - cut - HALF_RANGE_BINS) * bin_m, (last + 1 + cut - HALF_RANGE_BINS) * bin_m
 
 
@@ -64,10 +59,8 @@ def _wide_bands(points: HeadPoints) -> tuple[np.ndarray, np.ndarray, np.ndarray]
     Long windows look wide where a line leaves its head, as at a road crossing; short ones may have few points. Heads
     that touch are wide together for some metres.
     """
-    _, counts, wide_counts = points.histograms
-    right_m, left_m = bands(wide_counts, points.width_m)
-    least_m = points.width_m + MIN_WIDER_M
-    is_wide = [left - right > least_m for right, left in ((right_m, left_m), bands(counts, points.width_m))]
+    right_m, left_m = bands(points)
+    is_wide = [left - right > points.width_m + MIN_WIDER_M for right, left in ((right_m, left_m), bands(points, 0))]
     wide = points.free.all(axis=0) & np.all(is_wide, axis=0)
     return right_m, left_m, binary_opening(wide, np.ones(int(MIN_LENGTH_M / STATION_STEP_M)))
 
@@ -122,7 +115,7 @@ def _on_either_end(points: HeadPoints) -> _Band | None:
     right_m, left_m, wide = _wide_bands(points)
     if not wide.any():
         return None
-    line, along, (stations, *_), half_m = points.line, points.along, points.histograms, 0.5 * points.width_m
+    line, along, stations, half_m = points.line, points.along, points.stations, 0.5 * points.width_m
     shifts = np.where(wide, left_m - half_m, 0.0), np.where(wide, right_m + half_m, 0.0)
     left, right = (
         line + smooth_profile(stations, shift, SMOOTHING_M, along)[:, None] * left_normals(line) for shift in shifts

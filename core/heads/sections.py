@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from .edges import ENOUGH_POINTS, STATION_STEP_M, VIEW_STATIONS, station_count, stations_along
-from .head_points import HeadPoints, near_lines
+from .edges import VIEW_STATIONS
+from .head_points import ENOUGH_POINTS, HeadPoints, near_lines
 from .outline import CROWN_RADIUS_M, MIN_NOISE_M, Grid, Outline, Scores, Section, fit_section, log_likelihood
 
 MIN_SECTION_POINTS = 250
@@ -135,12 +135,11 @@ def outline_middles(points: HeadPoints, seen: np.ndarray) -> Middles:
     count, head_width_m = len(seen), points.width_m
     middles = Middles.unknown(count)
     left, up, level = points.in_frame()
-    level = np.interp(stations_along(points.length_m), points.t, level) if len(level) else middles.top
-    station = np.minimum((points.t / STATION_STEP_M).astype(int), count - 1)
+    level = np.interp(points.stations, points.t, level) if len(level) else middles.top
     head, grid = Head(head_width_m, Outline.of(head_width_m)), Grid.of(head_width_m)
     bins = grid.number(left, up)
-    used = (bins >= 0) & seen[station]
-    left, up, station, bins = left[used], up[used], station[used], bins[used]
+    used = (bins >= 0) & seen[points.station]
+    left, up, station, bins = left[used], up[used], points.station[used], bins[used]
     section: Section | None = None
     for first, last in _borders(station, count):
         here = slice(*np.searchsorted(station, [first, last]))
@@ -285,8 +284,8 @@ def likelier_width(lines: Sequence[np.ndarray], xyz: np.ndarray, widths_m: Seque
     for points in near_lines(lines, xyz, max(widths_m)):
         left, up, _ = replace(points, width_m=widths_m[0]).in_frame()
         bins = grid.number(left, up)
-        station = points.t[bins >= 0] / STATION_STEP_M
-        for first, last in _borders(station, station_count(points.length_m)):
+        station = points.station[bins >= 0]
+        for first, last in _borders(station, len(points.stations)):
             here = bins[bins >= 0][slice(*np.searchsorted(station, [first, last]))]
             counts = np.bincount(here, minlength=grid.size).astype(float)
             if counts.sum() >= MIN_SECTION_POINTS:

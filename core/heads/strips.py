@@ -17,7 +17,7 @@ from scipy.sparse.linalg import spsolve
 from ..parameters import Parameters
 from ..polyline import distance_to, interpolate, left_normals, length_along
 from ..rails import Support
-from .edges import HALF_HEAD_BINS, middles
+from .edges import edge_middles
 from .head_points import HeadPoints
 from .top import find_top
 
@@ -199,8 +199,7 @@ class _Shown:
     def by(cls, strip: HeadPoints) -> _Shown | None:
         """Measure the head in the points of one strip; None if it has too few."""
         top, _ = strip.top
-        stations, counts, wide_counts = strip.histograms
-        middle = middles(counts, wide_counts, strip.free) * strip.width_m / (2 * HALF_HEAD_BINS)
+        stations, (middle, _) = strip.stations, edge_middles(strip, strip.free)
         steps = _steps(strip.length_m)
         points = np.bincount(np.minimum((strip.t[top] / STEP_M).astype(int), steps - 1), minlength=steps)
         number, known = np.minimum((stations / STEP_M).astype(int), steps - 1), np.isfinite(middle)

@@ -10,10 +10,8 @@ from typing import Union
 
 import numpy as np
 
-from ..lines.paek import VARIANCE_FACTOR
-from ..lines.smoothing import smooth_profile
+from ..lines.smoothing import VARIANCE_FACTOR, smooth_profile
 from ..rails import Support
-from .edges import STATION_STEP_M, stations_along
 from .envelope import extremal_boundary
 from .head_points import RIM_HEADS, HeadPoints
 from .level import AXIS_SHARE, OFF_TOP_SIGMAS, SLOPE_ROUNDS, cross_slope, robust_sigma, rough_level
@@ -146,12 +144,11 @@ def by_outline(top: Top, outline: Middles) -> Top:
 
     Both have their information, and one spline smooths them.
     """
-    length_m, chosen = top.points.length_m, top.points.within(AXIS_SHARE)
-    points, stations = top.points[chosen], stations_along(length_m)
+    chosen = top.points.within(AXIS_SHARE)
+    points, stations = top.points[chosen], top.points.stations
     flat = points.z - top.slope[chosen] * points.across
-    number = np.minimum((points.t / STATION_STEP_M).astype(int), len(stations) - 1)
-    count = np.bincount(number, minlength=len(stations))
-    mean_m = np.bincount(number, flat, len(stations)) / np.maximum(count, 1)
+    count = points.per_station()
+    mean_m = points.per_station(flat) / np.maximum(count, 1)
     outlined = np.isfinite(outline.top) & (outline.top_information > 0)
     by_points = count / robust_sigma(flat - top.course.at(points.t)) ** 2
     information = np.where(outlined, outline.top_information, by_points)
@@ -159,7 +156,7 @@ def by_outline(top: Top, outline: Middles) -> Top:
     if not known.any():
         return top
     t, values = stations[known], np.where(outlined, outline.top, mean_m)[known]
-    course = smooth(t, values, information[known], -TAIL_M, length_m + TAIL_M)
+    course = smooth(t, values, information[known], -TAIL_M, points.length_m + TAIL_M)
     common_m = np.where(outlined, outline.top_common, top.crown_m)[known]
     return replace(top, course=course, crown_m=np.interp(stations, t, course.followed(t, common_m, information[known])))
 

@@ -11,9 +11,9 @@ import numpy as np
 
 from ..classify.settings import Settings
 from ..clouds.points import Request
-from ..clouds.readers import CATALOGUES, READERS, list_files
+from ..clouds.readers import CATALOGUE, SUFFIXES, list_files
 from ..clouds.rewriting import Places, check_class, rewrite
-from ..clouds.vpc import CatalogueTile, catalogue_text
+from ..clouds.vpc import catalogue_text
 from ..disk import NEW, Destination, alone_in, identity, replace_folder, writing
 from ..errors import DiskError, ParameterError, RailExtractError
 from ..grow.growth import Stop
@@ -27,7 +27,6 @@ from .finding import find_rail_points, report
 UNCLASSIFIED = 1
 """Class of a point that loses the rail class."""
 
-CATALOGUE = ".vpc"
 COPC = ".copc"
 
 
@@ -131,8 +130,8 @@ def plan_output(paths: Sequence[Path], output: Path, class_code: int, progress: 
     files = list_files(paths)
     for file in files:
         check_class(file, class_code)
-    is_single = len(files) == 1 and Path(paths[0]).is_file() and Path(paths[0]).suffix.lower() not in CATALOGUES
-    suffixes = tuple(READERS) if is_single else (*READERS, *CATALOGUES)
+    is_single = len(files) == 1 and Path(paths[0]).is_file() and Path(paths[0]).suffix.lower() != CATALOGUE
+    suffixes = SUFFIXES if is_single else (*SUFFIXES, CATALOGUE)
     if output.suffix.lower() not in suffixes:
         raise ParameterError(
             f"{output.name} is not a name for the classified cloud: let it end in {' or '.join(suffixes)}."
@@ -305,7 +304,7 @@ class _Writer:
             counts = list(in_listed_order(tasks, runner.run(tasks, progress)))
             _check_complete(runner)
             tiles = [
-                CatalogueTile(f"./{output.file.stem}/{name}", count, header.extent)
+                (f"./{output.file.stem}/{name}", count, header.extent)
                 for name, count, header in zip(output.names, counts, self._request.headers)
             ]
             with output.destination.replacing() as catalogue:

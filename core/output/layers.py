@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Union
 
 import numpy as np
@@ -11,12 +11,9 @@ import numpy as np
 from ..alignment.elements import Alignment
 from ..alignment.equations import measured
 from ..alignment.table import rows
-from ..fields import AIRBORNE_STATION_FIELDS, DEVIATION_FIELDS, DIFFERENCE_FIELDS, QUALITY_FIELDS, STATION_FIELDS
-from ..frame import LocalFrame
-from ..products import (
+from ..fields import (
     AXES,
     CENTERLINES,
-    DEVIATIONS,
     DIFFERENCES,
     ELEMENTS,
     FINDINGS,
@@ -24,17 +21,18 @@ from ..products import (
     LOCATED_QUALITY,
     QUALITY,
     RAILS,
+    STATION_FIELDS,
     STATIONS,
     STOPS,
     Product,
 )
+from ..frame import LocalFrame
 from ..rails import Centerline, RailLine, RailNetwork, TrackGeometry
 from ..report import Finding, list_findings
 
 if TYPE_CHECKING:
     from ..airborne.proposals import ProposedGuide
     from ..airborne.survey import AirborneLine, AirborneTrack
-    from ..alignment.deviations import Deviations
     from ..comparison.tracks import TrackComparison
     from ..grow.growth import Stop
 
@@ -115,30 +113,31 @@ def findings_layer(found: Sequence[Finding]) -> Layer:
     return lines_layer(LOCATED_FINDINGS if located else FINDINGS, found)
 
 
-def quality_layer(tracks: Sequence[TrackGeometry]) -> Layer:
-    """Make a layer of the stations of tracks: with an axis, also with their kilometres."""
-    columns = [_along(tracks, field.name) for field in QUALITY_FIELDS]
-    located = [track.kilometres for track in tracks if track.kilometres is not None]
-    if located:
-        columns += [[value for one in located for value in getattr(one, field.name)] for field in STATION_FIELDS]
-    return Layer(LOCATED_QUALITY if located else QUALITY, columns, _stations(tracks))
+def stations_layer(product: Product, tracks: Sequence[Any]) -> Layer:
+    """Make a layer of the stations of tracks, whose attributes, one or one for each station, have the fields' names."""
+    columns = [_along(tracks, field.name) for field in product.fields]
+    return Layer(product, columns, [place for track in tracks for place in track.xyz])
 
 
-def airborne_stations_layer(tracks: Sequence[AirborneTrack]) -> Layer:
-    """Make a layer of the stations along guides."""
-    columns = [_along(tracks, field.name) for field in AIRBORNE_STATION_FIELDS]
-    columns[0] = [int(number) or None for number in columns[0]]
-    return Layer(STATIONS, columns, _stations(tracks))
-
-
-def _along(tracks: Sequence[TrackGeometry] | Sequence[AirborneTrack], name: str) -> list[Any]:
+def _along(tracks: Sequence[Any], name: str) -> list[Any]:
     """Return an attribute of tracks, one value for all stations of a track or one for each."""
     return [value for track in tracks for value in np.broadcast_to(getattr(track, name), len(track.xyz))]
 
 
-def _stations(tracks: Sequence[Any]) -> list[np.ndarray]:
-    """Return the places of all stations."""
-    return [place for track in tracks for place in track.xyz]
+def quality_layer(tracks: Sequence[TrackGeometry]) -> Layer:
+    """Make a layer of the stations of tracks: with an axis, also with their kilometres."""
+    plain = stations_layer(QUALITY, tracks)
+    located = [track.kilometres for track in tracks if track.kilometres is not None]
+    if not located:
+        return plain
+    further = [[value for one in located for value in getattr(one, field.name)] for field in STATION_FIELDS]
+    return Layer(LOCATED_QUALITY, [*plain.columns, *further], plain.xyz)
+
+
+def airborne_stations_layer(tracks: Sequence[AirborneTrack]) -> Layer:
+    """Make a layer of the stations along guides."""
+    made = stations_layer(STATIONS, tracks)
+    return replace(made, columns=[[int(number) or None for number in made.columns[0]], *made.columns[1:]])
 
 
 def stops_layer(stops: Sequence[Stop]) -> Layer:
@@ -168,16 +167,9 @@ def axes_layer(alignments: Sequence[Alignment]) -> Layer:
     return Layer(AXES, columns, lines)
 
 
-def deviations_layer(found: Sequence[Deviations]) -> Layer:
-    """Make a layer of the deviations of tracks, as points on their designs."""
-    columns: list[Sequence[Any]] = [[one.track_id for one in found for _ in one.s]]
-    columns += [[value for one in found for value in getattr(one, field.name)] for field in DEVIATION_FIELDS[1:]]
-    return Layer(DEVIATIONS, columns, [place for one in found for place in one.xyz])
-
-
 def differences_layer(found: TrackComparison) -> Layer:
     """Make a layer of the stations of a comparison."""
     stations = [(line, at) for line in found.lines for at in range(len(line.state)) if line.state[at]]
     columns: list[Sequence[Any]] = [[line.line_id for line, _ in stations]]
-    columns += [[getattr(line, field.name)[at] for line, at in stations] for field in DIFFERENCE_FIELDS[1:]]
+    columns += [[getattr(line, field.name)[at] for line, at in stations] for field in DIFFERENCES.fields[1:]]
     return Layer(DIFFERENCES, columns, [line.xyz[at] for line, at in stations])

@@ -6,8 +6,11 @@ The plugin reads and writes these files with GDAL, the command line writes them 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+import os
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -184,6 +187,66 @@ def on_one_grid(rasters: Sequence[RailRaster], frame: LocalFrame) -> tuple[list[
         tiles = {(row + down, column + right): tile for (row, column), tile in raster.tiles.items()}
         aligned.append(replace(raster, tiles=tiles, x0=0.0, y0=0.0))
     return aligned, frame.with_origin(np.array([first.x0, first.y0, 0.0]))
+
+
+def write_rasters(path: Path, header: RasterHeader, rasters: Sequence[RailRaster]) -> None:
+    """Write rasters of one grid without QGIS, one band each; empty blocks take no space.
+
+    Parameters
+    ----------
+    path : Path
+        New file.
+    header : RasterHeader
+    rasters : sequence of RailRaster
+        On the grid of the header.
+
+    Raises
+    ------
+    OSError
+        The file can't be written.
+    """
+    import rasterio
+
+    _, _, height, width = header.window
+    x, y = header.corner
+    layout = {
+        "driver": "GTiff",
+        "height": height,
+        "width": width,
+        "count": len(header.class_codes),
+        "dtype": "uint8",
+        "crs": header.frame.crs_wkt,
+        "transform": rasterio.Affine(header.cell, 0.0, x, 0.0, -header.cell, y),
+        "nodata": NO_DATA,
+        "tiled": True,
+        "blockxsize": BLOCK,
+        "blockysize": BLOCK,
+        "sparse_ok": True,
+        "interleave": "band",
+        "compress": "deflate",
+        "bigtiff": "IF_SAFER",
+    }
+    try:
+        with _own_proj_data(), rasterio.Env(), rasterio.open(path, "w", **layout) as file:
+            file.update_tags(**header.tags)
+            for band, (code, raster) in enumerate(zip(header.class_codes, rasters), start=1):
+                file.set_band_description(band, str(code))
+                for top, left in header.filled_blocks(raster):
+                    cells = header.block(raster, top, left)
+                    window = rasterio.windows.Window(left, top, cells.shape[1], cells.shape[0])
+                    file.write(cells, band, window=window)
+    except rasterio.errors.RasterioError as error:
+        raise OSError(str(error)) from error
+
+
+@contextmanager
+def _own_proj_data() -> Iterator[None]:
+    """Let rasterio find the data of its own PROJ: the variables may name those of QGIS, which is another version."""
+    hidden = {name: os.environ.pop(name) for name in ("PROJ_DATA", "PROJ_LIB") if name in os.environ}
+    try:
+        yield
+    finally:
+        os.environ.update(hidden)
 
 
 def _millimetres(length_m: float | None) -> str:

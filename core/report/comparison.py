@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
 
 import numpy as np
 
 from ..comparison.tracks import BOTH, EXTRA, MISSING, SURE, LineDifferences, TrackComparison
-from .markup import made, metres, page, section, table, tag, text, tiles, verdict_box
-from .plots import LEFT, PANEL, RIGHT, SPACE, WIDTH, Frame, Panel, picture, place_of, round_up
+from .markup import figure, known, largest, made, metres, page, rms, section, table, tag, text, tiles, verdict_box
+from .plots import LEFT, PANEL, RIGHT, SPACE, WIDTH, Curve, Frame, Panel, draw_panels, picture, round_up
 
 BINS = 40
 """Bars of a distribution."""
@@ -98,8 +97,8 @@ def _tiles(found: TrackComparison) -> str:
         (metres(found.moved_m), "moved"),
         (metres(found.length_of(MISSING)), "missing"),
         (metres(found.length_of(EXTRA)), "extra"),
-        (_figure(_rms(found.values("across_mm"))), "across, root mean square"),
-        (_figure(_rms(found.values("height_mm"))), "height, root mean square"),
+        (figure(rms(found.values("across_mm"))), "across, root mean square"),
+        (figure(rms(found.values("height_mm"))), "height, root mean square"),
     )
     return tiles(figures)
 
@@ -111,9 +110,8 @@ def _rows(found: TrackComparison) -> Iterator[tuple[object, ...]]:
     for name, values in _quantities(found).items():
         size = np.abs(values)
         if len(values):
-            largest = values[np.argmax(size)]
-            figures = (values.mean(), _rms(values), np.median(size), np.percentile(size, 95), largest)
-            yield (name, *map(_figure, figures), len(values))
+            figures = (values.mean(), rms(values), np.median(size), np.percentile(size, 95), largest(values))
+            yield (name, *map(figure, figures), len(values))
 
 
 def _quantities(found: TrackComparison) -> dict[str, np.ndarray]:
@@ -124,9 +122,9 @@ def _quantities(found: TrackComparison) -> dict[str, np.ndarray]:
     )
     return {
         "Across": found.values("across_mm"),
-        "Across, without the shift": across[np.isfinite(across)],
+        "Across, without the shift": known(across),
         "Height": found.values("height_mm"),
-        "Height, without the shift": height[np.isfinite(height)],
+        "Height, without the shift": known(height),
         "Gauge": found.values("gauge_mm"),
         "Cant": found.values("cant_mm"),
     }
@@ -164,14 +162,9 @@ def _places(found: TrackComparison) -> Iterator[str]:
 def _sections(line: LineDifferences) -> Iterator[tuple[object, ...]]:
     for what, which in (("moved", line.moved), (MISSING, line.state == MISSING), (EXTRA, line.state == EXTRA)):
         for start_m, end_m, stations in line.sections(which):
-            largest = (_largest(getattr(line, name)[stations]) for name in ("across_mm", "height_mm"))
+            off_mm = (largest(getattr(line, name)[stations]) for name in ("across_mm", "height_mm"))
             place = f"{start_m:,.1f} to {end_m:,.1f} m"
-            yield (what, line.line_id, place, metres(end_m - start_m), *largest)
-
-
-def _largest(values: np.ndarray) -> str:
-    known = values[np.isfinite(values)]
-    return _figure(float(known[np.argmax(np.abs(known))])) if len(known) else ""
+            yield (what, line.line_id, place, metres(end_m - start_m), *(figure(one, unknown="") for one in off_mm))
 
 
 def _profiles(line: LineDifferences, counts_shift: bool) -> str:
@@ -184,34 +177,14 @@ def _profiles(line: LineDifferences, counts_shift: bool) -> str:
         ("Gauge", line.gauge_mm, None, None),
         ("Cant", line.cant_mm, None, None),
     )
-    shown = [column for column in columns if np.isfinite(column[1]).any()]
-    panels = [
-        _panel(Panel(name, "mm", values, MIN_SPAN_MM), shift, sigma, line.chainage_m, along, place_of(number))
-        for number, (name, values, shift, sigma) in enumerate(shown)
-    ]
-    drawn = picture(f"Differences of line {line.line_id}", panels, along, "chainage [m]")
-    return section(f"Line {line.line_id}", drawn)
-
-
-def _panel(
-    panel: Panel,
-    shift: np.ndarray | None,
-    sigma: np.ndarray | None,
-    chainage: np.ndarray,
-    along: tuple[float, float],
-    top: float,
-) -> str:
-    """Draw one difference along a line."""
-    band = [] if shift is None or sigma is None else [shift - SURE * sigma, shift + SURE * sigma]
-    frame = Frame(top, along, replace(panel, values=np.concatenate([panel.values, *band])).limits())
-    curves = [frame.curve(chainage, limit, style="stroke: var(--good)") for limit in band]
-    unit = "[mm]; green: limits of a movement" if band else "[mm]"
-    return frame.draw(panel.heading, unit, *curves, frame.curve(chainage, panel.values))
-
-
-def _rms(values: np.ndarray) -> float:
-    return float(np.sqrt(np.mean(values**2))) if len(values) else np.nan
-
-
-def _figure(value: float) -> str:
-    return f"{value:.1f} mm" if np.isfinite(value) else "unknown"
+    panels = []
+    for name, values, center, sigma in columns:
+        if np.isfinite(values).any():
+            limits = [] if center is None or sigma is None else [center - SURE * sigma, center + SURE * sigma]
+            curves = [Curve(line.chainage_m, limit, style="stroke: var(--good)") for limit in limits]
+            curves.append(Curve(line.chainage_m, values))
+            unit = "[mm]; green: limits of a movement" if limits else "[mm]"
+            panels.append(Panel(name, unit, curves, MIN_SPAN_MM))
+    return section(
+        f"Line {line.line_id}", draw_panels(f"Differences of line {line.line_id}", panels, along, "chainage [m]")
+    )

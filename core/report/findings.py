@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..checks.strips import find_jumps
+from ..checks.doubts import find_jumps
 from ..polyline import interpolate, length_along, project
 from ..rails import STRIP_OFF_M, Centerline, HeadWidths, RailLine, RailNetwork, TrackGeometry, cell_borders
 

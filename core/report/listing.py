@@ -1,5 +1,6 @@
-"""The list of findings, the most harmful first: the table of the report and the layer FINDINGS.
+"""The list of findings, the most harmful first, and the verdict on the tracks that were found, in words.
 
+The list is the table of the report and the layer FINDINGS.
 See docs/method.md section 9.2.
 """
 
@@ -11,10 +12,26 @@ from typing import Any
 
 import numpy as np
 
-from ..checks.strips import ARM_M
+from ..checks.doubts import ARM_M
 from ..polyline import length_along
+from ..progress import counted
 from ..rails import RailLine, RailNetwork, TrackGeometry
-from .findings import DOUBTS, OFF_GAUGE, UNSUPPORTED, Findings, Hole, Place, TrackFindings, examine
+from .findings import (
+    DOUBTS,
+    FEW,
+    MANY,
+    OFF_GAUGE,
+    SILENT_SHARE,
+    UNSUPPORTED,
+    UNSURE,
+    UNSURE_MM,
+    Findings,
+    Hole,
+    Place,
+    TrackFindings,
+    examine,
+)
+from .markup import known, median, metres, rms
 
 OFF_RAIL_MM = 70.0
 """Possible error where a line is missing, or belongs to no track: a line off by the width of a railhead is off its
@@ -23,6 +40,14 @@ rail, and being further off makes it no worse."""
 STEP = "the track steps {:.0f} mm to the side"
 
 LONE_RAIL, HOLE = "a rail belongs to no track", "no rails were found between tracks {} and {}, which are likely one"
+
+VERDICTS = (
+    (0.0, "good", "Good throughout: every metre is supported by points, at gauge, with a small standard error."),
+    (FEW, "good", "Good, except for a few places to look at."),
+    (MANY, "fair", "Usable, but look at the findings before you rely on the lines."),
+    (np.inf, "poor", "Poor: large parts are in doubt. Check rail points, gauge, railhead width and point density."),
+)
+"""Share of the length in doubt up to which a verdict applies, CSS class of the verdict, and its words."""
 
 
 @dataclass(frozen=True)
@@ -181,3 +206,47 @@ def _of_lone_rail(rail: RailLine) -> Finding:
         sigma_mm=rail.sigma_mm,
         points=round(rail.points),
     )
+
+
+def summary(network: RailNetwork, gauges_m: Sequence[float]) -> tuple[str, str]:
+    """Return the verdict in words, and the figures that it is based on.
+
+    Parameters
+    ----------
+    network : RailNetwork
+        The verdict needs the geometry of its tracks.
+    gauges_m : sequence of float
+        Gauges that tracks may have.
+    """
+    rails, tracks = (
+        f"{counted(len(lines), what)} ({metres(sum(line.length_m for line in lines))})"
+        for what, lines in (("rail", network.rails), ("track", network.centerlines))
+    )
+    figures = f"{rails}, {tracks}"
+    if not network.centerlines:
+        return "No track was found.", f"{figures}."
+    if not network.geometry:
+        return "No verdict: choose the output REPORT or FINDINGS for one.", f"{figures}."
+    findings = examine(network, gauges_m)
+    sigma = np.concatenate([track.sigma_mm for track in network.geometry])
+    error = f"{median(sigma):.1f} mm (median), {rms(sigma):.1f} mm (rms)" if known(sigma).size else "unknown"
+    _, words = verdict(findings)
+    return words, (
+        f"{figures}: standard error {error}, {100 * findings.share:.1f} % of the tracks in doubt, "
+        f"{counted(len(listed(findings)), 'finding')}."
+    )
+
+
+def verdict(findings: Findings) -> tuple[str, str]:
+    """Return the CSS class and the words of the verdict on tracks that were found."""
+    # What no station shows is a reason to look, not to discard: conductor rails are lone lines, too.
+    silent = min(findings.silent_share, MANY) if findings.silent_share > SILENT_SHARE else 0.0
+    share = max(findings.share, silent)
+    unsure = findings.length_of(UNSURE) / findings.length_m if findings.tracks else 0.0
+    if share > MANY >= max(share - unsure, silent):
+        # Points at gauge whose cloud resolves no more: nothing is wrong that a setting could mend.
+        return "fair", (
+            f"Less accurate than a track survey accepts: the standard error is above {UNSURE_MM:g} mm across "
+            f"or in height on {100 * unsure:.0f} % of the length."
+        )
+    return next((kind, words) for limit, kind, words in VERDICTS if share <= limit)

@@ -55,12 +55,10 @@ class Origin:
         first, *more = (path.resolve().name for path in self.paths)
         source = f"{first} and {len(more)} more" if more else first
         facts = {
-            "Date": f"{self.time:%Y-%m-%d %H:%M}",
-            "Version": f"Rail Extract {VERSION}",
+            **stated(network.frame.crs_wkt, self.time),
             "Rail": self.standard.label,
             "Gauge": ", ".join(f"{1000 * gauge_m:g} mm" for gauge_m in self.gauges_m),
             "Railhead width": ", ".join(self._head_widths()),
-            "Coordinate system": title_of(network.frame.crs_wkt),
             "Parameters": _stated(self.parameters) if self.parameters else "",
             "Command": self.command,
         }
@@ -91,7 +89,16 @@ def _stated(parameters: Parameters) -> str:
     return ", ".join(stated)
 
 
-def title_of(crs_wkt: str | None) -> str:
+def stated(crs_wkt: str | None, time: datetime | None = None) -> dict[str, str]:
+    """Return what a report states in every case: the time, now unless another one is given, version and system."""
+    return {
+        "Date": f"{time or datetime.now():%Y-%m-%d %H:%M}",
+        "Version": f"Rail Extract {VERSION}",
+        "Coordinate system": _title(crs_wkt),
+    }
+
+
+def _title(crs_wkt: str | None) -> str:
     """Code and name of a coordinate system, as QGIS shows them."""
     if not crs_wkt:
         return "none stated: metres"

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
+from ..frame import LocalFrame
 from ..rails import ENOUGH_CELLS_PER_M, RailNetwork, SearchFigures
 from .findings import (
     DOUBTS,
@@ -17,12 +18,24 @@ from .findings import (
     examine,
 )
 from .limits import limits_table
-from .listing import Finding, listed
-from .markup import legend, made, metres, note, page, section, table, tag, text, tiles, verdict_box
-from .plan import draw_plan
-from .plots import draw_profiles
-from .strip_plots import draw_strips, list_strips, strip_legend
-from .summary import verdict
+from .listing import Finding, listed, verdict
+from .markup import (
+    figure,
+    known,
+    legend,
+    made,
+    median,
+    metres,
+    note,
+    page,
+    section,
+    table,
+    tag,
+    text,
+    tiles,
+    verdict_box,
+)
+from .track_plots import draw_plan, draw_profiles, draw_strips
 
 CLASSES_ADVICE = (
     "Rail classes: choose the class of the rails; in a raw cloud, which has none, have the rail points found."
@@ -74,20 +87,24 @@ def build_page(
         A complete HTML document.
     """
     findings = examine(network, gauges_m)
-    heights = [_heights(network, track) for track in findings.tracks]
     return page(
         f"Rail Extract: {source}",
         "Rail Extract report",
         source,
         _verdict(findings, network),
         _tiles(network, findings),
-        *([_map(findings), _findings(findings), _tracks(findings)] if findings.tracks else []),
-        *([section("Limits", limits_table(findings.tracks))] if findings.tracks else []),
+        *(_of_all(findings) if findings.tracks else []),
         _search(network.search),
         _strips(network),
-        *(_profiles(track, height) for track, height in zip(findings.tracks, heights)),
+        *(_profiles(track, network.frame) for track in findings.tracks),
         made({**(facts or {}), "Engine": network.engine}, NOTES),
     )
+
+
+def _of_all(findings: Findings) -> list[str]:
+    """Write what is shown of all tracks together."""
+    plan, limits = section("Map", draw_plan(findings), _keys()), section("Limits", limits_table(findings.tracks))
+    return [plan, _findings(findings), _tracks(findings), limits]
 
 
 def _verdict(findings: Findings, network: RailNetwork) -> str:
@@ -131,26 +148,16 @@ def _reason(findings: Findings, doubt: Doubt) -> str:
 def _tiles(network: RailNetwork, findings: Findings) -> str:
     """Write the most important figures."""
     sigma = np.concatenate([track.geometry.sigma_mm for track in findings.tracks] or [np.empty(0)])
-    known = sigma[np.isfinite(sigma)]
+    density = [track.geometry.points / track.geometry.cells_m for track in findings.tracks]
     figures = [
         (f"{len(findings.tracks):,}", "track" if len(findings.tracks) == 1 else "tracks"),
         (metres(findings.length_m), "of track"),
         (str(len(network.rails)), f"rails, {metres(sum(rail.length_m for rail in network.rails))}"),
-        (f"{np.median(known):.1f} mm" if len(known) else "unknown", "standard error across, median"),
+        (figure(median(sigma)), "standard error across, median"),
         (f"{100 * (1 - findings.share):.1f} %", "of it without doubt"),
-        (f"{_density(findings):.0f}", "points per metre of track, median"),
+        (f"{np.median(np.concatenate(density)) if density else 0:.0f}", "points per metre of track, median"),
     ]
     return tiles(figures)
-
-
-def _density(findings: Findings) -> float:
-    """Return the median number of points on both rails per metre of track; 0 without tracks."""
-    density = [track.geometry.points / track.geometry.cells_m for track in findings.tracks]
-    return float(np.median(np.concatenate(density))) if density else 0.0
-
-
-def _map(findings: Findings) -> str:
-    return section("Map", draw_plan(findings), _keys())
 
 
 def _keys(**more: str) -> str:
@@ -190,16 +197,10 @@ def _finding(finding: Finding) -> tuple[object, ...]:
         where,
         f"{finding.from_m:,.1f} to {finding.to_m:,.1f} m" if np.isfinite(finding.from_m) else "",
         metres(finding.doubt_m),
-        _figure(finding.worst_m, "m"),
-        _figure(finding.gauge_mm, "mm"),
-        _figure(finding.sigma_mm, "mm"),
-        _figure(finding.sigmaz_mm, "mm"),
+        figure(finding.worst_m, unit="m", unknown=""),
+        *(figure(one, unknown="") for one in (finding.gauge_mm, finding.sigma_mm, finding.sigmaz_mm)),
         finding.reason,
     )
-
-
-def _figure(value: float, unit: str) -> str:
-    return f"{value:.1f} {unit}" if np.isfinite(value) else ""
 
 
 def _tracks(findings: Findings) -> str:
@@ -233,8 +234,8 @@ def _row(track: TrackFindings) -> tuple[str, ...]:
         _span(geometry.twist_mm, "mm"),
         _tightest(geometry.radius_m),
         _span(geometry.grade_pm, "‰"),
-        _median(geometry.sigma_mm),
-        _median(geometry.sigmaz_mm),
+        figure(median(geometry.sigma_mm)),
+        figure(median(geometry.sigmaz_mm)),
         metres(track.length_of(UNSUPPORTED)),
     )
 
@@ -247,21 +248,13 @@ def _kilometres(track: TrackFindings) -> str:
 
 
 def _span(values: np.ndarray, unit: str) -> str:
-    known = values[np.isfinite(values)]
-    return f"{known.min():.1f} to {known.max():.1f} {unit}" if len(known) else "unknown"
-
-
-def _median(values: np.ndarray) -> str:
-    known = values[np.isfinite(values)]
-    return f"{np.median(known):.1f} mm" if len(known) else "unknown"
+    values = known(values)
+    return f"{values.min():.1f} to {values.max():.1f} {unit}" if len(values) else "unknown"
 
 
 def _tightest(radius_m: np.ndarray) -> str:
-    known = radius_m[np.isfinite(radius_m)]
-    if not len(known):
-        return "straight"
-    tightest = known[np.argmin(np.abs(known))]
-    return f"{abs(tightest):,.0f} m {'left' if tightest > 0 else 'right'}"
+    tightest = min(known(radius_m).tolist(), key=abs, default=None)
+    return f"{abs(tightest):,.0f} m {'left' if tightest > 0 else 'right'}" if tightest else "straight"
 
 
 def _search(found: SearchFigures | None) -> str:
@@ -306,23 +299,26 @@ def _search(found: SearchFigures | None) -> str:
 
 
 def _strips(network: RailNetwork) -> str:
-    """Write how the strips differ, if there are several."""
+    """Write how the strips differ, if there are several: mean and range of the offsets along each track."""
     if not network.strips:
         return ""
-    tracks = dict.fromkeys(course.track_id for course in network.strips)
-    drawn = []
-    for track_id in tracks:
+    rows, drawn = [], []
+    for course in network.strips:
+        offsets = [
+            cell
+            for values in (course.across_mm, course.up_mm)
+            for cell in (f"{values.mean():+.1f} mm", f"{values.min():+.1f} to {values.max():+.1f} mm")
+        ]
+        rows.append((course.track_id, course.strip, metres(float(len(course.chainage_m))), *offsets))
+    for track_id in dict.fromkeys(course.track_id for course in network.strips):
         courses = [course for course in network.strips if course.track_id == track_id]
-        drawn += [tag("p", text(f"Track {track_id}")), draw_strips(courses), strip_legend(courses)]
-    return section("Strips", list_strips(network.strips), *drawn, note(STRIP_NOTE))
+        drawn += [tag("p", text(f"Track {track_id}")), draw_strips(courses)]
+    headings = ("Track", "Strip", "With others", "Across", "Range", "Height", "Range")
+    return section("Strips", table(headings, rows), *drawn, note(STRIP_NOTE))
 
 
-def _profiles(track: TrackFindings, height_m: np.ndarray) -> str:
+def _profiles(track: TrackFindings, frame: LocalFrame) -> str:
+    """Draw a track by its chainage, with heights above the cloud's datum."""
+    height_m = frame.to_crs(track.geometry.xyz)[:, 2] * frame.vertical_unit_m
     keys = _keys(band=f"gauge within {GAUGE_OFF_MM:g} mm of nominal")
     return section(f"Track {track.line.track_id}", draw_profiles(track, height_m), keys)
-
-
-def _heights(network: RailNetwork, track: TrackFindings) -> np.ndarray:
-    """Return the heights of a track's stations above the cloud's datum in metres."""
-    frame = network.frame
-    return frame.to_crs(track.geometry.xyz)[:, 2] * frame.vertical_unit_m

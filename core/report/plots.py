@@ -1,15 +1,13 @@
-"""Profiles of a track by chainage: one panel per quantity, over a common axis."""
+"""Pictures of quantities along a track: one panel per quantity, over a common axis."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from ..tracks.geometry import TWIST_BASE_M
-from .findings import DOUBTS, GAUGE_OFF_MM, TrackFindings
 from .markup import tag, text
 
 WIDTH, LEFT, RIGHT = 1040.0, 92.0, 24.0
@@ -26,38 +24,23 @@ ROOM = 0.08
 
 
 @dataclass(frozen=True)
-class Panel:
-    """A quantity along the track.
+class Curve:
+    """Values at places along a track, (n,) each, with the class or the style of their line."""
 
-    Attributes
-    ----------
-    heading, unit : str
-    values : (n,) array
-    min_span : float
-        Smallest range of the panel, so that noise does not look alarming.
-    band : tuple of float or None
-        Lower and upper limit of the values that are in order.
-    floor : float or None
-        Lower end of the panel, if fixed.
-    """
-
-    heading: str
-    unit: str
+    places: np.ndarray
     values: np.ndarray
-    min_span: float
-    band: tuple[float, float] | None = None
-    floor: float | None = None
+    class_: str = "curve"
+    style: str | None = None
 
-    def limits(self) -> tuple[float, float]:
-        """Return the lower and the upper end of the panel: band and values, widened to `min_span`, with some room."""
-        known = self.values[np.isfinite(self.values)]
-        low, high = (float(known.min()), float(known.max())) if len(known) else (0.0, 0.0)
-        if self.band:
-            low, high = min(low, self.band[0]), max(high, self.band[1])
-        lacking = max(self.min_span - (high - low), 0.0) / 2
-        room = ROOM * max(high - low, self.min_span)
-        low, high = low - lacking - room, high + lacking + room
-        return (self.floor, high) if self.floor is not None else (low, high)
+
+@dataclass(frozen=True)
+class Shade:
+    """A section to mark in all panels: its ends, its CSS class and what it says."""
+
+    start: float
+    end: float
+    class_: str
+    title: str
 
 
 @dataclass(frozen=True)
@@ -87,10 +70,6 @@ class Frame:
         low, high = self.limits
         return self.top + PANEL - (value - low) * PANEL / (high - low)
 
-    def curve(self, places: np.ndarray, values: np.ndarray, class_: str = "curve", style: str | None = None) -> str:
-        """Return the curve of values, (n,), at places along the track."""
-        return tag("path", d=curve(self.x(places), self.y(values)), class_=class_, style=style)
-
     def draw(self, heading: str, unit: str, *content: str, behind: Sequence[str] = (), class_: str = "panel") -> str:
         """Return the panel with its heading, its grid and what is drawn `behind` it and over it."""
         parts = [tag("rect", x=LEFT, y=self.top, width=WIDTH - LEFT - RIGHT, height=PANEL, class_=class_), *behind]
@@ -102,9 +81,74 @@ class Frame:
         return "".join([*parts, *content, tag("text", name, x=LEFT, y=self.top - 8, class_="heading")])
 
 
-def place_of(number: int) -> float:
-    """Return the upper side of a panel, counted from 0."""
-    return number * (PANEL + SPACE) + SPACE
+@dataclass(frozen=True)
+class Panel:
+    """A quantity along the track.
+
+    Attributes
+    ----------
+    heading, unit : str
+        The unit as it is written beside the heading.
+    curves : sequence of Curve
+    min_span : float
+        Smallest range of the panel, so that noise does not look alarming.
+    band : tuple of float or None
+        Lower and upper limit of the values that are in order.
+    floor, ceiling : float or None
+        Ends of the panel, if fixed.
+    """
+
+    heading: str
+    unit: str
+    curves: Sequence[Curve]
+    min_span: float
+    band: tuple[float, float] | None = None
+    floor: float | None = None
+    ceiling: float | None = None
+
+    def limits(self) -> tuple[float, float]:
+        """Return the lower and the upper end of the panel: band and values, widened to `min_span`, with some room."""
+        every = np.concatenate([*(one.values for one in self.curves), np.array(self.band or ())])
+        known = every[np.isfinite(every)]
+        low, high = (float(known.min()), float(known.max())) if len(known) else (0.0, 0.0)
+        lacking = max(self.min_span - (high - low), 0.0) / 2
+        room = ROOM * max(high - low, self.min_span)
+        return (
+            low - lacking - room if self.floor is None else self.floor,
+            high + lacking + room if self.ceiling is None else self.ceiling,
+        )
+
+    def draw(self, frame: Frame, shades: Sequence[Shade] = (), class_: str = "panel") -> str:
+        """Return the panel with shades behind its curves, none of them narrower than a unit of the picture."""
+        behind = []
+        if self.band:
+            low, high = map(float, map(frame.y, self.band))
+            band = {"x": LEFT, "width": WIDTH - LEFT - RIGHT, "class_": "band", "y": high, "height": low - high}
+            behind.append(tag("rect", **band))
+        for one in shades:
+            start, end = frame.x(one.start), frame.x(one.end)
+            place = {"x": start, "y": frame.top, "width": max(end - start, 1.0), "height": PANEL}
+            behind.append(tag("rect", tag("title", text(one.title)), **place, class_=one.class_))
+        curves = [
+            tag("path", d=path(frame.x(one.places), frame.y(one.values)), class_=one.class_, style=one.style)
+            for one in self.curves
+        ]
+        return frame.draw(self.heading, self.unit, *curves, behind=behind, class_=class_)
+
+
+def draw_panels(
+    label: str, panels: Sequence[Panel], along: tuple[float, float], axis: str, *more: str, shades: Sequence[Shade] = ()
+) -> str:
+    """Return panels below each other as SVG, over a common axis."""
+    drawn = [
+        one.draw(Frame(bottom_of(number) + SPACE, along, one.limits()), shades) for number, one in enumerate(panels)
+    ]
+    return picture(label, drawn, along, axis, *more)
+
+
+def bottom_of(count: int) -> float:
+    """Return the lower side of the last of `count` panels with their headings."""
+    return count * (PANEL + SPACE)
 
 
 def across(place: Any, along: tuple[float, float]) -> Any:
@@ -114,7 +158,7 @@ def across(place: Any, along: tuple[float, float]) -> Any:
 
 def picture(label: str, panels: Sequence[str], along: tuple[float, float], axis: str, *more: str) -> str:
     """Return panels below each other as SVG, over an axis that is named at its left."""
-    bottom = len(panels) * (PANEL + SPACE)
+    bottom = bottom_of(len(panels))
     marks = [
         tag("text", text(f"{place:,g}"), x=float(across(place, along)), y=bottom + 16, class_="tick middle")
         for place in ticks(*along, TICKS_ACROSS)
@@ -128,38 +172,6 @@ def broken(places: np.ndarray, values: np.ndarray, step_m: float) -> tuple[np.nd
     """Insert NaN where places, (n,), are more than a step apart, so that a curve breaks there."""
     breaks = np.flatnonzero(np.diff(places) > step_m) + 1
     return np.insert(places.astype(float), breaks, np.nan), np.insert(values.astype(float), breaks, np.nan)
-
-
-def draw_profiles(track: TrackFindings, height_m: np.ndarray) -> str:
-    """Return the profiles of height, gauge, cant, twist, curvature and standard error of a track as SVG.
-
-    Parameters
-    ----------
-    track : TrackFindings
-    height_m : (n,) array
-        Heights of the stations above the cloud's datum.
-    """
-    along = float(track.geometry.chainage_m[0]), float(track.geometry.chainage_m[-1])
-    panels = [
-        _draw_panel(panel, track, Frame(place_of(number), along, panel.limits()))
-        for number, panel in enumerate(_panels(track, height_m))
-    ]
-    kilometres = _kilometres(track, along, len(panels) * (PANEL + SPACE) + 32)
-    return picture(f"Profiles of track {track.line.track_id}", panels, along, "chainage [m]", *kilometres)
-
-
-def _kilometres(track: TrackFindings, along: tuple[float, float], y: float) -> list[str]:
-    """Write the kilometres along the axis below the chainages."""
-    kilometres = track.geometry.kilometres
-    if kilometres is None:
-        return []
-    at = ticks(*along, TICKS_ACROSS)
-    nearest = np.argmin(np.abs(track.geometry.chainage_m[:, None] - at), axis=0)
-    marks = [
-        tag("text", text(kilometres.km_text[number] or ""), x=float(across(place, along)), y=y, class_="tick middle")
-        for place, number in zip(at, nearest)
-    ]
-    return [*marks, tag("text", text("kilometre"), x=LEFT - 8, y=y, class_="tick end")]
 
 
 def ticks(low: float, high: float, count: int) -> np.ndarray:
@@ -182,44 +194,12 @@ def round_up(value: float) -> float:
     return float(power * next(factor for factor in (1, 2, 5, 10) if value <= power * factor))
 
 
-def curve(x: np.ndarray, y: np.ndarray) -> str:
+def path(x: np.ndarray, y: np.ndarray) -> str:
     """Return the SVG path through points, (n,) each; it breaks at NaN and is thinned to the picture's resolution."""
     x, y = _thinned(x, y)
     known = np.isfinite(y)
     moves = known & ~np.concatenate([[False], known[:-1]])
     return "".join(f"{'M' if move else 'L'}{a:.1f} {b:.1f}" for a, b, ok, move in zip(x, y, known, moves) if ok)
-
-
-def _panels(track: TrackFindings, height_m: np.ndarray) -> list[Panel]:
-    geometry, gauge = track.geometry, track.nominal_mm
-    curvature = np.where(np.isnan(geometry.radius_m), 0.0, 1000 / geometry.radius_m)
-    return [
-        Panel("Height", "m", height_m, 0.2),
-        Panel(f"Gauge, nominal {gauge:g}", "mm", geometry.gauge_mm, 20, (gauge - GAUGE_OFF_MM, gauge + GAUGE_OFF_MM)),
-        Panel("Cant, left minus right", "mm", geometry.cant_mm, 20),
-        Panel(f"Twist over {TWIST_BASE_M:g} m", "mm", geometry.twist_mm, 6),
-        Panel("Curvature, positive to the left", "1/km", curvature, 0.4),
-        Panel("Standard error", "mm", geometry.sigma_mm, 4, floor=0.0),
-    ]
-
-
-def _draw_panel(panel: Panel, track: TrackFindings, frame: Frame) -> str:
-    behind = list(_shades(track, frame))
-    if panel.band:
-        low, high = map(float, map(frame.y, panel.band))
-        band = tag("rect", x=LEFT, width=WIDTH - LEFT - RIGHT, class_="band", y=high, height=low - high)
-        behind.insert(0, band)
-    values = frame.curve(track.geometry.chainage_m, panel.values)
-    return frame.draw(panel.heading, f"[{panel.unit}]", values, behind=behind)
-
-
-def _shades(track: TrackFindings, frame: Frame) -> Iterator[str]:
-    """Mark the places in doubt; places less than a unit of the picture apart merge, and no mark is narrower."""
-    for doubt in DOUBTS:
-        for place in track.places(doubt, merge_m=track.length_m / WIDTH):
-            start, end = frame.x(place.start_m), frame.x(place.end_m)
-            title = tag("title", text(f"{doubt.label}: {place.start_m:.1f} to {place.end_m:.1f} m"))
-            yield tag("rect", title, x=start, y=frame.top, width=max(end - start, 1.0), height=PANEL, class_=doubt.name)
 
 
 def _thinned(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

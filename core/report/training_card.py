@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .markup import made, note, page, section, table, verdict_box
-from .plots import Frame, picture, place_of
+from .plots import Curve, Panel, draw_panels
 
 if TYPE_CHECKING:
     from ..labelling.training import Plan
@@ -79,12 +79,8 @@ def _verdict(total: Figures) -> str:
 
 
 def _row(name: str, figures: Figures) -> tuple[object, ...]:
-    rails = figures.right + figures.missed
-    return (name, f"{rails:,}", *(_number(value) for value in (figures.recall, figures.precision, figures.f1)))
-
-
-def _number(value: float) -> str:
-    return f"{value:.3f}" if np.isfinite(value) else ""
+    shares = (figures.recall, figures.precision, figures.f1)
+    return (name, f"{figures.right + figures.missed:,}", *(f"{one:.3f}" if np.isfinite(one) else "" for one in shares))
 
 
 def _curves(trained: Trained) -> str:
@@ -97,16 +93,7 @@ def _curves(trained: Trained) -> str:
     }
     along = float(steps[0]), float(max(steps[-1], steps[0] + 1))
     panels = [
-        _panel(name, steps, np.array(values, dtype=float), along, place_of(number), None if number == 0 else 1.0)
-        for number, (name, values) in enumerate(columns.items())
+        Panel(name, "", [Curve(steps, np.array(values, dtype=float))], 1e-3, floor=0.0, ceiling=ceiling)
+        for (name, values), ceiling in zip(columns.items(), (None, 1.0, 1.0))
     ]
-    return picture("Course of the training", panels, along, "step")
-
-
-def _panel(
-    name: str, steps: np.ndarray, values: np.ndarray, along: tuple[float, float], top: float, high: float | None
-) -> str:
-    """Draw one quantity from 0 to `high`, or to its largest value."""
-    known = values[np.isfinite(values)]
-    frame = Frame(top, along, (0.0, high or (float(known.max()) if len(known) else 1.0)))
-    return frame.draw(name, "", frame.curve(steps, values))
+    return draw_panels("Course of the training", panels, along, "step")

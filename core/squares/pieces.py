@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..frame import LocalFrame
-from ..lines.uniting import SAME_RAIL_M
+from ..lines.finishing import SAME_RAIL_M
 from ..polyline import interpolate, length_along, project, resample, runs
 from ..rails import RailLine
 from .grid import HALO_M, Square

@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..heads.edges import Widths
 from ..heads.elevation import measure_again
+from ..heads.head_points import Widths
+from ..lines.finishing import united
 from ..lines.smoothing import GAP_SIGMAS
-from ..lines.uniting import united
 from ..polyline import length_along, resample, runs
 from ..progress import SILENT, Progress
 from ..rails import RailLine

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..frame import LocalFrame
-from ..lines.uniting import SAME_RAIL_M, united
+from ..lines.finishing import SAME_RAIL_M, united
 from ..polyline import interpolate, length_along, project
 from ..rails import RailLine
 from .grid import HALO_M, Key, Square, around

@@ -8,9 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import NoTrackError
-from ..lines.paek import REACH_SIGMAS
-from ..lines.smoothing import STATIONS_PER_SIGMA, smooth_line
-from ..lines.uniting import united
+from ..lines.finishing import united
+from ..lines.smoothing import REACH_SIGMAS, STATIONS_PER_SIGMA, smooth_line
 from ..parameters import Parameters
 from ..polyline import MIN_RING_M, is_closed, left_normals, length_along, resample, starts_at_its_end
 from ..progress import SILENT, Progress
@@ -18,10 +17,18 @@ from ..rails import Centerline, RailLine
 from ..standards import STANDARDS
 from .chaining import Chain, chain_pairs, runs_on, single_rail_limit
 from .forking import fork_centerlines
-from .midline import MAX_OFFSET_M, Meeting, Side, at_gauge, bridged_steps, midway
+from .midline import (
+    MAX_OFFSET_M,
+    PROVISIONAL_STEP_M,
+    Meeting,
+    Side,
+    at_gauge,
+    bridged_steps,
+    midway,
+    provisional_centerline,
+)
 from .pairing import MIN_SECTION_M, pair_rails
 from .parallels import most_common_spacing
-from .provisional import PROVISIONAL_STEP_M, provisional_centerline
 
 STATIONS_AT_ONCE = 8192
 """Stations processed at once, 2 km of track: lets the user cancel several times per second."""

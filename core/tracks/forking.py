@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..lines.parting import ARC, STRAIGHT, PartingLaw, left_of
+from ..lines.ends import ARC, STRAIGHT, PartingLaw, left_of
 from ..polyline import length_along, project, resample
 from ..progress import SILENT, Progress
 from ..rails import Centerline

@@ -17,10 +17,8 @@ from .branches import choose_routes, free_third_rails, resolve_branches
 from .crossings import resolve_crossings
 from .joining import join_gaps
 from .junctions import clean_junctions, cut_kinks, run_through, weld_pairs
-from .pixels import chamfer_distance, close, parity_fix, pixel_set
+from .skeleton import chamfer_distance, close, parity_fix, pixel_set, prune, trace, veinerize
 from .slips import add_curves, open_slips
-from .tracing import trace
-from .veinerization import prune, veinerize
 
 __all__ = ["LineNetwork", "vectorize"]
 

@@ -8,10 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..lines.bridges import FIT_M, MISFIT_M, Bridge, bridge
-from ..lines.ends import even_points, tip_and_direction
+from ..lines.ends import ARC, FIT_M, MISFIT_M, Bridge, PartingLaw, bridge, even_points, tip_and_direction
 from ..lines.network import LineNetwork
-from ..lines.parting import ARC, PartingLaw
 from ..polyline import length_along
 from ..progress import SILENT, Progress
 from .branches import MAX_BACK_M, STEADY_M

@@ -9,10 +9,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..lines.bridges import MISFIT_M, bridge
-from ..lines.ends import STEP_M, cut_back, even_points, turned
+from ..lines.ends import ARC, MISFIT_M, STEP_M, PartingLaw, bridge, cut_back, even_points, turned
 from ..lines.network import LineNetwork
-from ..lines.parting import ARC, PartingLaw
 from ..polyline import length_along
 from .crossings import MISFIT_M as KNOWN_MISFIT_M
 from .crossings import SKIP_M

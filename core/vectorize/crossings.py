@@ -10,8 +10,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..lines.bridges import Bridge, bridge
-from ..lines.ends import cut_back, even_points
+from ..lines.ends import Bridge, bridge, cut_back, even_points
 from ..lines.network import LineNetwork
 from .junctions import ends_by_node, unsteadiness
 

@@ -10,8 +10,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..lines.bridges import STAIRS_M, STEADY_TRANSITION_M, TRANSITION_M, Bridge, bridge
-from ..lines.ends import STEP_M, cut_back, even_points, tip_and_direction
+from ..lines.ends import (
+    STAIRS_M,
+    STEADY_TRANSITION_M,
+    STEP_M,
+    TRANSITION_M,
+    Bridge,
+    bridge,
+    cut_back,
+    even_points,
+    tip_and_direction,
+)
 from ..lines.network import LineNetwork
 from ..progress import SILENT, Progress
 from .crossings import MAX_MERGED_M

@@ -1,27 +1,42 @@
-"""A worker process: how it is started, what is sent to it, and how it ends."""
+"""Worker processes: how one is started and ended, and what it does with the tasks that come through its input.
+
+Imports nothing that takes time: a process says that it is ready before a task makes it load numpy.
+"""
 
 from __future__ import annotations
 
 import os
-import pickle  # nosec B403 - read from processes that this one has started only
+import pickle  # nosec B403 - read from processes that this one has started, or that started it
+import signal
 import subprocess  # nosec B404 - starts this Python only
 import sys
 import threading
-from collections.abc import Mapping
+import time
+from collections.abc import Hashable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from queue import SimpleQueue
+from typing import Any, Callable
 
 from ..kernels import ENVIRONMENT
-
-ENDED = -1
-"""The message of a process that has ended; `serving` lists the others."""
+from ..progress import Progress
+from ..tasks import Context, Once, Task
 
 PROGRAM = "import sys; sys.path[:] = sys.argv[1:]; from {} import serve; serve()"
 """Looks for modules where this process does: the current folder, which is the first place otherwise, may hold any."""
 
 NO_WINDOW = getattr(subprocess, "CREATE_NO_WINDOW", 0)
 """On Windows, a console would open for each process."""
+
+REPORT_EVERY_S = 0.1
+"""Least time between two reports of the fraction that is done, and interval at which cancellation is checked."""
+
+READY, FRACTION, STATUS, ANSWER, ENDED = range(5)
+"""What a message says: the process has started; how much of the task is done; what it is doing; its `Answer`; the
+process has ended."""
+
+Send = Callable[[int, Any], None]
+"""Sends a message: one of the above, and what belongs to it."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +65,7 @@ class Worker:
 
     def __init__(self, interpreter: Interpreter, messages: Messages) -> None:
         self._process = subprocess.Popen(  # nosec B603
-            [interpreter.program, "-c", PROGRAM.format(f"{__package__}.serving"), *sys.path],
+            [interpreter.program, "-c", PROGRAM.format(__name__), *sys.path],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
@@ -87,3 +102,101 @@ class Worker:
                 messages.put((self, *pickle.load(self._process.stdout)))  # type: ignore[arg-type] # nosec B301
         except Exception:  # noqa: BLE001 - cut off in the middle, a message can raise anything
             messages.put((self, ENDED, None))
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What comes of a task.
+
+    Attributes
+    ----------
+    result : bytes
+        The result, pickled; not to be read if there is an error.
+    error : BaseException or None
+        What the task raised.
+    said : tuple of (str, str)
+        Name of a method of `Progress`, and the text with which the task called it.
+    """
+
+    result: bytes
+    error: BaseException | None
+    said: tuple[tuple[str, str], ...]
+
+
+def serve() -> None:
+    """Execute tasks until the input ends, as it does when the process that started this one ends in any way."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal sends Ctrl-C to all; the parent process ends its workers
+    output = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # what libraries print would be taken for messages
+
+    def send(kind: int, content: Any) -> None:
+        pickle.dump((kind, content), output, pickle.HIGHEST_PROTOCOL)
+        output.flush()
+
+    tasks: SimpleQueue[bytes] = SimpleQueue()
+    threading.Thread(target=_receive, args=(tasks,), daemon=True).start()
+    send(READY, None)
+    once = Once()
+    while True:
+        send(ANSWER, answer(tasks.get(), once, send))
+
+
+def _receive(tasks: SimpleQueue[bytes]) -> None:
+    """Pass tasks on; end the process with its input, whatever it is computing."""
+    while True:
+        try:
+            tasks.put(pickle.load(sys.stdin.buffer))  # nosec B301
+        except (EOFError, OSError, pickle.UnpicklingError):
+            os._exit(0)
+
+
+def packed(task: Task, inputs: Mapping[Hashable, bytes]) -> bytes:
+    """Return a task and the pickled results that it takes, as `answer` reads them."""
+    return pickle.dumps((task, dict(inputs)), pickle.HIGHEST_PROTOCOL)
+
+
+def answer(content: bytes, once: Once, send: Send) -> Answer:
+    """Execute a task; errors of every kind are for the parent process to raise."""
+    heard = _Heard(send)
+    try:
+        task, inputs = pickle.loads(content)  # nosec B301
+        results = {name: pickle.loads(one) for name, one in inputs.items()}  # nosec B301
+        result = task.function(*task.arguments, Context(results, once, heard))
+        return Answer(pickle.dumps(result, pickle.HIGHEST_PROTOCOL), None, tuple(heard.said))
+    except BaseException as error:  # lazrs raises one on damaged files that is not an `Exception`
+        return Answer(b"", _sendable(error), tuple(heard.said))
+
+
+def _sendable(error: BaseException) -> BaseException:
+    """Return an error, or one that says the same if it can't be pickled or made again."""
+    try:
+        pickle.loads(pickle.dumps(error))  # nosec B301
+        return error
+    except Exception:
+        return RuntimeError(f"{type(error).__name__}: {error}")
+
+
+class _Heard(Progress):
+    """Sends how far a task is, and keeps what it says for the log."""
+
+    def __init__(self, send: Send) -> None:
+        self.said: list[tuple[str, str]] = []
+        self._send, self._sent = send, time.monotonic()
+
+    def set_fraction(self, fraction: float) -> None:
+        now = time.monotonic()
+        if now - self._sent >= REPORT_EVERY_S:
+            self._sent = now
+            self._send(FRACTION, fraction)
+
+    def status(self, text: str) -> None:
+        self._send(STATUS, text)
+
+    def info(self, text: str) -> None:
+        self.said.append(("info", text))
+
+    def warning(self, text: str) -> None:
+        self.said.append(("warning", text))
+
+    def propose(self, standard: str) -> None:
+        self.said.append(("propose", standard))

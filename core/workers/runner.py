@@ -15,14 +15,22 @@ from ..errors import RailExtractError
 from ..kernels import cores
 from ..progress import SILENT, Progress, counted
 from ..tasks import InTurn, Name, Results, Runner, Task, turns
-from .process import ENDED, Interpreter, Messages, Worker
-from .serving import ANSWER, FRACTION, READY, STATUS, Answer, packed
+from .process import (
+    ANSWER,
+    ENDED,
+    FRACTION,
+    READY,
+    REPORT_EVERY_S,
+    STATUS,
+    Answer,
+    Interpreter,
+    Messages,
+    Worker,
+    packed,
+)
 
 WORTH_S = 5.0
 """Least work, in seconds, for which workers are started: that takes each of them one to two seconds."""
-
-POLL_S = 0.1
-"""Interval at which cancellation is checked."""
 
 WORKER_BYTES = 600 << 20
 """Memory of a worker at its peak (docs/scaling.md)."""
@@ -51,14 +59,9 @@ def memory_bytes() -> int:
 def workers(
     wanted: int, interpreter: Callable[[], Interpreter] = lambda: Interpreter(sys.executable)
 ) -> Iterator[Runner]:
-    """Provide a runner with workers, which end with the context.
+    """Provide a runner with workers, as many as `worker_count` says, which end with the context.
 
-    Parameters
-    ----------
-    wanted : int
-        Number of workers; see `worker_count`.
-    interpreter : callable
-        Finds the Python program; called when the first worker is started.
+    The Python program is looked for when the first worker is started.
     """
     count = worker_count(wanted)
     if count == 1:
@@ -136,16 +139,7 @@ class Workers:
 
 
 class _Run:
-    """One execution of tasks: what waits, what runs, and what is finished.
-
-    Parameters
-    ----------
-    tasks : mapping of Name to Task
-    idle : sequence of Worker
-    messages : SimpleQueue
-        Messages of the workers.
-    progress : Progress
-    """
+    """One execution of tasks: what waits, what runs, and what is finished."""
 
     def __init__(self, tasks: Mapping[Any, Task], idle: Sequence[Worker], messages: Messages, progress: Progress):
         self._tasks, self._messages, self._progress = tasks, messages, progress
@@ -228,4 +222,4 @@ def _next(messages: Messages, progress: Progress) -> tuple[Worker, int, Any]:
     while True:
         progress.check()
         with suppress(Empty):
-            return messages.get(timeout=POLL_S)
+            return messages.get(timeout=REPORT_EVERY_S)

@@ -116,6 +116,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("scenes", nargs="*", metavar="SCENE", help=f"any of {', '.join(SCENES)}; all by default")
     parser.add_argument("--into", type=Path, default=Path(), help="folder to write to (default: here)")
     parser.add_argument("--name", help="name of the files, for a single scene (default: that of the scene)")
+    parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> None:

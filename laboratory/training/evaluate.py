@@ -58,6 +58,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     parser.add_argument("weights", type=Path, nargs="*", help=".npz files (default: the shipped models)")
     parser.add_argument("--count", type=int, default=COUNT, help=f"number of rasters to use (default {COUNT})")
+    parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> None:

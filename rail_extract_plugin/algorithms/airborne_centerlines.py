@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from ...core.errors import ParameterError
+from ...core.fields import AIRBORNE, PROPOSED
 from ...core.parameters import AirborneParameters
-from ...core.products import AIRBORNE, PROPOSED
 from ...core.progress import Estimating, Progress
 from ...core.standards import SEARCHED_CLASSES, RailStandard
 from ..dialog import inputs, outputs

@@ -71,9 +71,9 @@ class BuildTrackCenterlines(RailAlgorithm):
     def compute(self, job: Job, values: ParameterValues, progress: Progress) -> dict[str, Any]:
         """Pair the rails of each class, then write the centerlines."""
         from ...core.checks.lines import with_tracks
+        from ...core.fields import CENTERLINES, RAILS
         from ...core.output.layers import lines_layer
-        from ...core.products import CENTERLINES, RAILS
-        from ...core.steps import tracks_of
+        from ...core.squares.steps import tracks_of
         from ..reading.line_layers import read_rails
 
         rails, frame = read_rails(values.lines("INPUT"), progress.span(0, READING))

@@ -91,7 +91,8 @@ class FitAlignment(RailAlgorithm):
     def compute(self, job: Job, values: ParameterValues, progress: Progress) -> dict[str, Any]:
         """Fit each track, then write elements and deviations."""
         from ...core.alignment.fit import fit_tracks
-        from ...core.output.layers import deviations_layer, elements_layer
+        from ...core.fields import DEVIATIONS
+        from ...core.output.layers import elements_layer, stations_layer
         from ..reading.tracks_to_fit import read_fixed, read_tracks
 
         tracks, frame = read_tracks(job.tracks, job.quality, job.rails, progress.span(0, READING))
@@ -102,7 +103,7 @@ class FitAlignment(RailAlgorithm):
         name, facts = job.tracks.sourceName(), {"Command": job.command}
         makers = {
             "ELEMENTS": lambda: elements_layer(alignments),
-            "DEVIATIONS": lambda: deviations_layer(deviations),
+            "DEVIATIONS": lambda: stations_layer(DEVIATIONS, deviations),
         }
         writers = {
             **layer_writers(values, makers, frame),

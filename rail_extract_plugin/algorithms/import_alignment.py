@@ -105,8 +105,9 @@ class ImportAlignment(RailAlgorithm):
     def compute(self, job: Job, values: ParameterValues, progress: Progress) -> dict[str, Any]:
         """Read the file and write the layers."""
         from ...core.alignment.landxml_reading import read_landxml
+        from ...core.fields import DEVIATIONS
         from ...core.output.design_files import check_place
-        from ...core.output.layers import axes_layer, deviations_layer, elements_layer
+        from ...core.output.layers import axes_layer, elements_layer, stations_layer
 
         read = read_landxml(job.path, job.east_first, progress.span(0, READING))
         frame = replace(read[0].frame, crs_wkt=job.crs_wkt)
@@ -118,7 +119,7 @@ class ImportAlignment(RailAlgorithm):
         makers = {
             "ELEMENTS": lambda: elements_layer(alignments),
             "AXIS": lambda: axes_layer(alignments),
-            "DEVIATIONS": lambda: deviations_layer(deviations),
+            "DEVIATIONS": lambda: stations_layer(DEVIATIONS, deviations),
         }
         writers = {
             **layer_writers(values, makers, frame),

@@ -19,7 +19,7 @@ from ..writing.run import RUN, RunCloud, cloud_of
 from .findings import Review
 
 if TYPE_CHECKING:
-    from ...core.clouds.sections import Section
+    from ...core.clouds.cross_sections import CrossSection
 
 REACH_M = 2.0
 """Distance from the place up to which points are shown: both rails of any track, and what lies next to them."""
@@ -84,7 +84,7 @@ class Sections:
     def __init__(self, layer: QgsVectorLayer, found: Sequence[Review]) -> None:
         self.cloud = cloud_of(layer)
         self._units_m = np.array(self.cloud.units_m if self.cloud else (1.0, 1.0, 1.0))
-        self._planes: dict[int, Section] = {one.feature.id(): self._plane(one) for one in found}
+        self._planes: dict[int, CrossSection] = {one.feature.id(): self._plane(one) for one in found}
         self._run = layer.customProperty(RUN)
         self.points: dict[int, np.ndarray] = {}
         self.note = "" if self.cloud else "The layer does not state its cloud: only rails are shown."
@@ -131,12 +131,12 @@ class Sections:
         """Return the line of a finding, (n, 3) metres."""
         return np.nan_to_num(vertices_of(review.feature)) * self._units_m
 
-    def _plane(self, review: Review) -> Section:
-        from ...core.clouds.sections import section_at
+    def _plane(self, review: Review) -> CrossSection:
+        from ...core.clouds.cross_sections import cross_section_at
 
-        return section_at(self._line(review), review.worst_share)
+        return cross_section_at(self._line(review), review.worst_share)
 
-    def _rails(self, plane: Section, review: Review, width_m: float) -> tuple[np.ndarray, np.ndarray]:
+    def _rails(self, plane: CrossSection, review: Review, width_m: float) -> tuple[np.ndarray, np.ndarray]:
         """Return where the rails are in a plane, (k, 2), and which of them have no points there, (k,)."""
         crossings, missing = [np.empty((0, 2))], []
         for rail in _rails_of_run(self._run, self._units_m):
@@ -177,8 +177,8 @@ class ReadingTask(QgsTask):
     def run(self) -> bool:
         """Read the points; no exception may leave this method."""
         try:
+            from ...core.clouds.cross_sections import points_near
             from ...core.clouds.points import ask
-            from ...core.clouds.sections import points_near
 
             request = ask(self._cloud.paths, self._cloud.class_codes, self._cloud.crs_wkt)
             found = points_near(request, list(self._places.values()), REACH_M, TaskProgress(self))
@@ -205,7 +205,7 @@ def _level(rails: np.ndarray, points: np.ndarray | None) -> float:
     return 0.0
 
 
-def _crossings(rail: Rail, plane: Section) -> tuple[np.ndarray, np.ndarray]:
+def _crossings(rail: Rail, plane: CrossSection) -> tuple[np.ndarray, np.ndarray]:
     """Return where a rail crosses a plane within reach, (k, 2), and at which of its plan distances, (k,)."""
     along = length_along(rail.xyz[:, :2])
     ahead, right, up = plane.seen(rail.xyz).T

@@ -26,8 +26,7 @@ from qgis.core import (
 
 from ...core.disk import Destination
 from ...core.errors import RailExtractError
-from ...core.fields import BRIDGED, LENGTH, SIGMA, UNKNOWN_IN_METRES, Field
-from ...core.products import PLACES, Product
+from ...core.fields import BRIDGED, LENGTH, PLACES, SIGMA, UNKNOWN_IN_METRES, Field, Product
 from ...core.progress import SILENT, Progress
 from ..compat import INTEGER, REAL, TEXT, field
 from ..dialog.parameter_values import ParameterValues

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from datetime import datetime
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -71,17 +70,10 @@ def write_alignment_report(
     fitted : bool
         Whether the alignments were fitted to the tracks.
     """
-    from ...core import VERSION
     from ...core.report import build_alignment_page
-    from ...core.report.origin import title_of
 
     def build() -> str:
-        stated = {
-            "Date": f"{datetime.now():%Y-%m-%d %H:%M}",
-            "Version": f"Rail Extract {VERSION}",
-            "Coordinate system": title_of(courses[0][0].frame.crs_wkt),
-        }
-        return build_alignment_page(courses, source, {**stated, **facts}, fitted)
+        return build_alignment_page(courses, source, facts, fitted)
 
     return write_shown(values, build)
 

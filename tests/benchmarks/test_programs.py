@@ -4,7 +4,7 @@ import runpy
 from pathlib import Path
 
 import pytest
-from rail_extract.core import steps
+from rail_extract.core.squares import steps
 
 PROGRAMS = sorted((Path(__file__).resolve().parents[2] / "benchmarks").glob("*.py"))
 

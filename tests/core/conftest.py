@@ -46,3 +46,29 @@ def scheduler(client, tmp_path_factory):
         (folder / f"{name}.pem").write_text(text)
         words += [f"--tls-{name}", str(folder / f"{name}.pem")]
     return words
+
+
+@pytest.fixture(scope="session")
+def difference():
+    """Return where two results differ by a bit or a type; None if they do not."""
+
+    def find(one, other, where="differs"):
+        if type(one) is not type(other):
+            return where
+        if isinstance(one, np.ndarray):
+            same = (one.dtype, one.shape, one.tobytes()) == (other.dtype, other.shape, other.tobytes())
+            return None if same else where
+        if isinstance(one, dict) or hasattr(one, "__dict__"):
+            one, other = (fact if isinstance(fact, dict) else vars(fact) for fact in (one, other))
+            if one.keys() != other.keys():
+                return where
+            parts = [(f".{name}", one[name], other[name]) for name in one]
+        elif isinstance(one, (tuple, list)):
+            parts = [(f"[{number}]", *pair) for number, pair in enumerate(zip(one, other))]
+            if len(one) != len(other):
+                return where
+        else:
+            return None if one == other or one != one else where
+        return next(filter(None, (find(*pair, where + name) for name, *pair in parts)), None)
+
+    return find

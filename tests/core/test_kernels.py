@@ -8,9 +8,8 @@ import pytest
 from rail_extract.__main__ import _run
 from rail_extract.core.frpdf.cleanup import clean
 from rail_extract.core.frpdf.engine import make_engine
-from rail_extract.core.frpdf.models import MODELS
-from rail_extract.core.frpdf.weights import load_arrays
-from rail_extract.core.kernels import ENVIRONMENT, Library, _beside, _openblas, blas, cores, one_thread, opencv, threads
+from rail_extract.core.frpdf.models import MODELS, load_arrays
+from rail_extract.core.kernels import ENVIRONMENT, Library, _beside, _openblas, blas, cores, one_thread, threads
 from rail_extract.core.progress import Progress
 from rail_extract.core.raster import rasterize
 
@@ -111,14 +110,9 @@ def test_the_network_computes_on_one_thread(name, on_two_threads):
 def test_a_command_runs_on_one_thread(on_two_threads):
     libraries = on_two_threads(*blas())
     seen = []
-    assert _run(SimpleNamespace(run=lambda _: seen.extend(library.get() for library in libraries)), None) == 0
+    assert _run(SimpleNamespace(run=lambda _: seen.extend(library.get() for library in libraries))) == 0
     assert seen == [1] * len(libraries)
     assert {library.get() for library in libraries} == {2}
-
-
-def test_opencv_is_set_to_the_number_that_it_tells(on_two_threads):
-    (library,) = on_two_threads(opencv())
-    assert library.get() == 2
 
 
 @pytest.mark.parametrize(("limit", "most"), [("1", 1), ("2", 2), ("all", 64), ("0", 64)])

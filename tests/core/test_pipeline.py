@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rail_extract.core import pipeline, steps
+from rail_extract.core import pipeline
 from rail_extract.core.checks.lines import warn_of_split_classes
 from rail_extract.core.clouds.points import RailPoints
 from rail_extract.core.errors import Cancelled, NoTrackError, ParameterError
@@ -14,9 +14,10 @@ from rail_extract.core.polyline import length_along, project
 from rail_extract.core.progress import Progress
 from rail_extract.core.rails import RailLine, SearchFigures
 from rail_extract.core.raster import cell_size, rasterize
+from rail_extract.core.squares import steps
 from rail_extract.core.squares.grid import MemorySource
+from rail_extract.core.squares.steps import lines_of, tracks_of
 from rail_extract.core.standards import STANDARDS, RailStandard
-from rail_extract.core.steps import lines_of, tracks_of
 from rail_extract.core.tasks import InTurn
 from rail_extract.laboratory.curves import Element, trace, transition_curve
 from rail_extract.laboratory.scenes.plain import straight

@@ -77,11 +77,6 @@ def test_nothing_is_estimated_while_files_are_read():
     assert listener.texts[1:] == ["15 % done, about 80 seconds left", "20 % done, about 80 seconds left"]
 
 
-def test_estimates_start_late_and_have_an_interval():
-    assert run([(0.1 * step, step / 100) for step in range(1, 40)]) == []
-    assert len(run([(0.1 * step, step / 1000) for step in range(1, 1000)])) <= 20
-
-
 def test_spans_relay_everything():
     listener = Listener()
     span = Estimating(listener).span(0.2, 0.6)

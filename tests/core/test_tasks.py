@@ -5,7 +5,7 @@ import weakref
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from rail_extract.core.errors import Cancelled, NoTrackError
+from rail_extract.core.errors import Cancelled
 from rail_extract.core.progress import Progress
 from rail_extract.core.squares.grid import around
 from rail_extract.core.tasks import InTurn, Once, Task
@@ -89,16 +89,6 @@ def test_a_cancel_is_noticed_between_tasks():
     with pytest.raises(Cancelled):
         list(InTurn().run(tasks, Listener(cancel_at=0.5)))
     assert ran == [0, 1]
-
-
-def test_an_error_ends_the_run():
-    def fails(context):
-        raise NoTrackError("none")
-
-    runner = InTurn()
-    with pytest.raises(NoTrackError):
-        list(runner.run({1: Task("", fails, ())}))
-    assert runner.failures == []
 
 
 def test_an_engine_is_set_up_once_and_again_for_other_parameters():

@@ -78,8 +78,8 @@ def _make_weights(folder: Path) -> list[Path]:
 
 
 def _read_weights(path: Path) -> None:
-    from rail_extract.core.frpdf.folding import fold
-    from rail_extract.core.frpdf.weights import load_arrays
+    from rail_extract.core.frpdf.architecture import fold
+    from rail_extract.core.frpdf.models import load_arrays
 
     fold(load_arrays(path))
 
@@ -200,10 +200,10 @@ def _make_shapes(folder: Path) -> list[Path]:
 def _read_shapes(path: Path) -> None:
     """Read a vector file as the commands do, for a cloud in another coordinate system."""
     from rail_extract.core.clouds.crs import import_pyproj
-    from rail_extract.core.commands import shapes
+    from rail_extract.core.commands import vectors
 
     wkt = import_pyproj().CRS.from_epsg(32643).to_wkt()
-    for read in (shapes.read_seeds, shapes.read_lines, shapes.read_mask):
+    for read in (vectors.read_seeds, vectors.read_lines, vectors.read_mask):
         read(path, wkt)
 
 
@@ -222,7 +222,7 @@ def _read_names(path: Path) -> None:
     from rail_extract.core.errors import ParameterError
 
     try:
-        _, args = parse(["classify", f"@{path}", "--output", "out.laz"])
+        args = parse(["classify", f"@{path}", "--output", "out.laz"])
     except SystemExit as error:
         raise ParameterError("The arguments are refused.") from error
     ask(args.tiles, [RAIL])

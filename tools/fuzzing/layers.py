@@ -27,9 +27,9 @@ from qgis.core import (  # noqa: E402
     QgsVectorFileWriter,
     QgsVectorLayer,
 )
-from rail_extract.core import steps  # noqa: E402
 from rail_extract.core.errors import RailExtractError  # noqa: E402
 from rail_extract.core.progress import Progress  # noqa: E402
+from rail_extract.core.squares import steps  # noqa: E402
 
 from .clouds import SHAPES, write_las  # noqa: E402
 

@@ -11,7 +11,7 @@ from rail_extract.core.airborne.remarks import FLIGHT
 from rail_extract.core.airborne.run import Run
 from rail_extract.core.airborne.survey import Guide
 from rail_extract.core.clouds.points import ask
-from rail_extract.core.clouds.vpc import CatalogueTile, catalogue_text
+from rail_extract.core.clouds.vpc import catalogue_text
 from rail_extract.core.errors import CloudError, NoRailPointsError, ParameterError
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.parameters import AirborneParameters
@@ -112,7 +112,7 @@ def test_every_form_of_a_cloud_gives_the_same_stations(flown, whole, tmp_path, f
         for name, part in (("a", upper), ("b", ~upper)):
             write_airborne(AirborneCloud(flown.cloud.xyz[part], flown.cloud.strip[part]), tmp_path / f"{name}.laz")
     if form == "catalogue":
-        tiles = [CatalogueTile(f"{name}.laz", 1, (0.0, 0.0, 1.0, 1.0)) for name in "ab"]
+        tiles = [(f"{name}.laz", 1, (0.0, 0.0, 1.0, 1.0)) for name in "ab"]
         (tmp_path / "all.vpc").write_text(catalogue_text(tiles, None), encoding="utf-8")
     found = survey(tmp_path / "all.vpc" if form == "catalogue" else tmp_path, guides(flown), tmp_path)
     for one, other in zip(found.tracks, whole[0].tracks):

@@ -1,10 +1,11 @@
-"""Rails of no track, and lines that are too high or too low to be rails."""
+"""Rails of no track, lines that are too high or too low to be rails, and lines that smoothing displaces."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from rail_extract.core.checks.lines import with_tracks
+from rail_extract.core.checks.lines import displacement, warn_of_rails, with_tracks
+from rail_extract.core.parameters import Parameters
 from rail_extract.core.progress import Progress
 from rail_extract.core.rails import Centerline, RailLine
 from rail_extract.laboratory.curves import Element, trace
@@ -90,3 +91,46 @@ def test_what_is_left_out_is_said():
     assert "(+0.5 m, +5.3 m)" in warning or "(+0.6 m, +5.3 m)" in warning
     with_tracks(rails[:2], [track(1, 1, 2)], heard)
     assert len(heard.warnings) == 1
+
+
+def arc(radius_m, length_m=40.0):
+    angle = np.linspace(0, length_m / radius_m, 400)
+    return radius_m * np.column_stack([np.sin(angle), 1 - np.cos(angle)])
+
+
+def warned(line, smoothing_m):
+    heard = Heard()
+    rails = [rail(1, np.column_stack([line, np.zeros(len(line))]))]
+    warn_of_rails(rails, 10, Parameters(1.435, 0.072, smoothing_xy_m=smoothing_m), heard)
+    return heard.warnings
+
+
+@pytest.mark.parametrize(("radius_m", "sigma_m"), [(25, 1.0), (60, 2.0), (300, 3.0)])
+def test_a_line_that_ends_in_an_arc_is_displaced_in_proportion_to_sigma_squared(radius_m, sigma_m):
+    assert displacement(arc(radius_m), sigma_m) == pytest.approx(0.26 * sigma_m**2 / radius_m, rel=0.03)
+
+
+def test_a_ring_has_no_end():
+    assert displacement(arc(25.0, 2 * np.pi * 25.0), 2.0) == pytest.approx(1.8 * 2.0**4 / 25.0**3, abs=5e-4)
+
+
+def test_a_straight_line_stays():
+    assert displacement(np.array([[0.0, 0.0], [30.0, 10.0]]), 3.0) == pytest.approx(0, abs=1e-9)
+
+
+def test_three_metres_are_too_much_in_a_tram_curve():
+    assert warned(arc(25.0), 3.0) == [
+        "SMOOTHING_XY of 3 m displaces lines in curves by up to 98 mm, more than points can correct: "
+        "set it to 1.8 m or less."
+    ]
+    assert warned(arc(25.0), 1.8) == []
+
+
+def test_three_metres_do_no_harm_on_a_main_line():
+    assert warned(arc(300.0, 200.0), 3.0) == []
+
+
+def test_a_corner_that_no_rail_has_does_not_cause_a_warning_about_the_default():
+    corner = np.array([[0.0, 0.0], [10.0, 0.0], [10.0, 10.0]])
+    assert displacement(corner, 0.8) > 0.1
+    assert warned(corner, 0.8) == []

@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from rail_extract.core.checks.gauge_estimate import SEEN_SHARE
 from rail_extract.core.checks.standard import head_widths, warn_of_gauge, warn_of_spacing
 from rail_extract.core.clouds.points import RailPoints
 from rail_extract.core.frame import LocalFrame
-from rail_extract.core.heads.gauge_estimate import SEEN_SHARE
 from rail_extract.core.parameters import Parameters
 from rail_extract.core.progress import Progress
 from rail_extract.core.rails import RailLine
@@ -39,7 +39,7 @@ class Sampled:
         self._xyz = xyz
 
     def sample(self):
-        return self._xyz
+        return self._xyz, None
 
 
 def heads_of(curve, width_m, gauge_m=1.435, count=40_000):

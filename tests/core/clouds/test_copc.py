@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from rail_extract.core.clouds import copc, laz
+from rail_extract.core.clouds import laz
 from rail_extract.core.clouds.points import read_rail_points
 from rail_extract.core.clouds.readers import read_classes
 from rail_extract.core.errors import NoRailPointsError
@@ -58,7 +58,7 @@ def test_little_more_than_the_extent_is_read(cloud):
     low = LOW[:2]
     with laspy.open(cloud[0]) as reader:
         table = laz.read_chunk_table(cloud[0], reader.header)
-        chunks = copc.chunks_in(cloud[0], reader.header, table, (*low, *(low + 8.0)))
+        chunks = laz.chunks_in(cloud[0], reader.header, table, (*low, *(low + 8.0)))
     assert sum(one.points for one in chunks) < 0.4 * 4000
     assert len(chunks) < 0.1 * cloud[2]
     _, rails = read(cloud[0], (*low, *(low + 8.0)))
@@ -80,7 +80,7 @@ def test_an_octree_that_does_not_fit_the_chunks_is_not_used(cloud, tmp_path, dam
     extent = (*LOW[:2], *(LOW[:2] + 8.0))
     with laspy.open(path) as reader:
         table = laz.read_chunk_table(path, reader.header)
-        assert copc.chunks_in(tmp_path / "b.copc.laz", reader.header, table, extent) is None
+        assert laz.chunks_in(tmp_path / "b.copc.laz", reader.header, table, extent) is None
     np.testing.assert_array_equal(read(tmp_path / "b.copc.laz", extent)[0], cloud[3])
 
 

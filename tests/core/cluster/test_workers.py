@@ -122,7 +122,7 @@ def test_wrong_certificates_are_refused(client, scheduler, tmp_path, monkeypatch
 
 
 def test_a_scheduler_without_workers_is_named(monkeypatch):
-    monkeypatch.setattr("rail_extract.core.cluster.workers.WORKERS_S", 1)
+    monkeypatch.setattr("rail_extract.core.cluster.workers.TIMEOUT_S", 1)
     sentence = r"^The Dask scheduler at tcp://.* has no workers: start some"
     with (
         LocalCluster(n_workers=0, host="127.0.0.1", dashboard_address=None) as cluster,

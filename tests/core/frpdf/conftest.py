@@ -3,7 +3,7 @@
 import cv2
 import numpy as np
 import pytest
-from rail_extract.core.frpdf import folding
+from rail_extract.core.frpdf import architecture as module
 from rail_extract.core.frpdf.architecture import Architecture
 from rail_extract.core.frpdf.onnx import to_onnx
 
@@ -18,7 +18,7 @@ GAIN = 2.4
 @pytest.fixture(params=SMALL, ids=["cells", "blocks"])
 def architecture(request, monkeypatch):
     """The only architecture that weights can have."""
-    monkeypatch.setattr(folding, "ARCHITECTURES", (request.param,))
+    monkeypatch.setattr(module, "ARCHITECTURES", (request.param,))
     return request.param
 
 
@@ -45,8 +45,8 @@ def arrays(architecture, monkeypatch):
         return arrays.setdefault(name, values.astype(np.float32))
 
     with monkeypatch.context() as context:
-        context.setattr(folding, "_checked", draw)
-        folding.fold(arrays)
+        context.setattr(module, "_checked", draw)
+        module.fold(arrays)
     raster = np.pad(np.eye(60, dtype=np.float32), architecture.receptive_radius)
     logits = logits_of(arrays, raster, np.full_like(raster, 0.5), 0)
     arrays[f"layer.{len(architecture.stages) - 1}.bias"] -= np.median(logits)
@@ -60,6 +60,6 @@ def whole_pass(radius):
 
 
 def logits_of(arrays, raster, state, number):
-    net = cv2.dnn.readNetFromONNX(np.frombuffer(to_onnx(folding.fold(arrays)[number], *raster.shape), np.uint8))
+    net = cv2.dnn.readNetFromONNX(np.frombuffer(to_onnx(module.fold(arrays)[number], *raster.shape), np.uint8))
     net.setInput(np.stack([raster, state])[None] * 2 - 1)
     return net.forward()[0, 0]

@@ -1,12 +1,18 @@
-"""The choice of an engine, by name and by installed packages."""
+"""Engines: which one is chosen, a pass over pieces equals that of the whole network, and too little memory."""
 
 import sys
 from importlib.util import find_spec
 
+import cv2
+import numpy as np
 import pytest
-from rail_extract.core.errors import ModelError
+from rail_extract.core.errors import Cancelled, ModelError
+from rail_extract.core.frpdf import cleanup
 from rail_extract.core.frpdf import engine as engine_module
-from rail_extract.core.frpdf.engine import make_engine
+from rail_extract.core.frpdf.corridor import Piece, lay_fields
+from rail_extract.core.frpdf.engine import MAX_PIECE_CELLS, Engine, Step, make_engine
+from rail_extract.core.progress import SILENT, Progress
+from rail_extract.core.raster import RailRaster
 
 
 @pytest.fixture
@@ -19,11 +25,6 @@ def test_opencv_runs_where_pytorch_is_not_installed(random_arrays, without_torch
     assert make_engine(random_arrays).description.startswith("OpenCV")
     with pytest.raises(ModelError, match="package torch"):
         make_engine(random_arrays, "TORCH")
-
-
-def test_opencv_does_not_run_on_a_graphics_card(random_arrays):
-    with pytest.raises(ModelError, match="on the CPU only"):
-        make_engine(random_arrays, "OPENCV", "CUDA")
 
 
 def test_pytorch_runs_where_it_is_installed(random_arrays):
@@ -41,3 +42,183 @@ def test_opencv_replaces_a_pytorch_that_does_not_start(random_arrays, monkeypatc
     for asked in (("TORCH", "AUTO"), ("AUTO", "CUDA")):
         with pytest.raises(ModelError, match="PyTorch is installed but does not start"):
             make_engine(random_arrays, *asked)
+
+
+def engine_of(name, arrays):
+    if name == "OPENCV":
+        return make_engine(arrays, name)
+    pytest.importorskip("torch")
+    from rail_extract.core.frpdf.torch_engine import TorchEngine
+
+    return TorchEngine(arrays, "CPU", exact=True)
+
+
+def noise(height, width):
+    return (np.random.default_rng(0).random((height, width)) < 0.2).astype(np.float32)
+
+
+def quarters(height, width, row, column):
+    """Cut a rectangle into four at a row and a column."""
+    rows, columns = (0, row, height), (0, column, width)
+    return [
+        Piece(rows[i], columns[j], rows[i + 1] - rows[i], columns[j + 1] - columns[j]) for i in (0, 1) for j in (0, 1)
+    ]
+
+
+def cut(raster, pieces):
+    return [raster[piece.row : piece.row + piece.height, piece.column : piece.column + piece.width] for piece in pieces]
+
+
+@pytest.mark.parametrize("name", ["TORCH", "OPENCV"])
+@pytest.mark.parametrize("number", [0, 1])
+def test_pieces_joined_give_the_whole_network_amid_an_empty_raster(arrays, radius, whole_pass, name, number):
+    engine = engine_of(name, arrays)
+    height, width = 2 * radius + 12, 2 * radius + 32
+    raster = np.zeros((height, width), dtype=np.float32)
+    raster[radius:-radius, radius:-radius] = noise(12, 32)
+    state = np.full_like(raster, 0.5) if number == 0 else raster
+    # Beyond the reach of the rail cells, the whole network still sees the border of its raster.
+    seen, known = (np.pad(one, radius, constant_values=one[0, 0]) for one in (raster, state))
+    expected = 1 / (1 + np.exp(-whole_pass(arrays, seen, known, number)[radius:-radius, radius:-radius]))
+    pieces = quarters(height, width, radius + 4, radius + 20)
+    found = engine.sweep(cut(raster, pieces), cut(state, pieces), number, pieces, SILENT)
+    for part, of_whole in zip(found, cut(expected, pieces)):
+        np.testing.assert_allclose(part, of_whole, atol=1e-4)
+    assert np.ptp(expected) > 0.02
+
+
+@pytest.mark.parametrize("name", ["TORCH", "OPENCV"])
+def test_a_cancel_is_noticed_between_pieces(arrays, name):
+    class AfterThree(Progress):
+        calls = 0
+
+        def is_cancelled(self):
+            self.calls += 1
+            return self.calls > 3
+
+    listener, pieces = AfterThree(), quarters(40, 40, 20, 20)
+    parts = cut(noise(40, 40), pieces)
+    with pytest.raises(Cancelled):
+        engine_of(name, arrays).sweep(parts, parts, 1, pieces, listener)
+    assert listener.calls == 4
+
+
+@pytest.mark.parametrize("name", ["TORCH", "OPENCV"])
+def test_threads_that_share_the_pieces_change_no_bit(arrays, name, monkeypatch):
+    raster = noise(96, 96)
+    pieces = [Piece(row, column, 24, 24) for row in range(0, 96, 24) for column in range(0, 96, 24)]
+    engine, parts, found = engine_of(name, arrays), cut(raster, pieces), []
+    for count in (1, 3):
+        monkeypatch.setattr(engine_module, "threads", lambda count=count: count)
+        found.append(np.array(engine.sweep(parts, parts, 1, pieces, SILENT)))
+    np.testing.assert_array_equal(*found)
+
+
+def test_an_error_in_a_thread_ends_the_pass(arrays, monkeypatch):
+    class BrokenLayerError(Exception):
+        pass
+
+    def fails(*_):
+        raise BrokenLayerError
+
+    monkeypatch.setattr(engine_module, "threads", lambda: 3)
+    engine, pieces = engine_of("OPENCV", arrays), quarters(40, 40, 20, 20)
+    monkeypatch.setattr(engine, "_steps", lambda number: [Step(0, fails)])
+    with pytest.raises(BrokenLayerError):
+        engine.sweep(*[cut(noise(40, 40), pieces)] * 2, 1, pieces, SILENT)
+
+
+class Listener(Progress):
+    def __init__(self):
+        self.warnings = []
+
+    def warning(self, text):
+        self.warnings.append(text)
+
+
+def line(length):
+    """A raster whose corridor is one rectangle, so that pieces hold the same cells whichever way they are cut."""
+    columns = np.arange(length)
+    return RailRaster({}, 0.04, 0.0, 0.0).with_cells(np.column_stack([np.zeros_like(columns), columns]))
+
+
+def ask_numpy():
+    np.empty(1 << 60, dtype=np.uint8)
+
+
+def ask_opencv():
+    side = 1 << 30
+    cv2.copyMakeBorder(np.zeros((1, 1), np.uint8), 0, side, 0, side, cv2.BORDER_CONSTANT)
+
+
+def ask_pytorch():
+    import torch
+
+    torch.empty(1 << 60)
+
+
+def fill_the_card():
+    import torch
+
+    raise torch.cuda.OutOfMemoryError("out of memory")
+
+
+def exhausted(engine, ask, times):
+    """Let an engine ask for more memory than any computer has, the first few times that it loads an array."""
+    load, left = engine._load, [times]
+
+    def ask_and_load(array):
+        if left[0]:
+            left[0] -= 1
+            ask()
+        return load(array)
+
+    engine._load = ask_and_load
+    return engine
+
+
+ASKS = [("OPENCV", ask_numpy), ("OPENCV", ask_opencv), ("TORCH", ask_pytorch), ("TORCH", fill_the_card)]
+
+
+@pytest.mark.parametrize(("name", "ask"), ASKS)
+def test_smaller_parts_give_the_same_result(arrays, name, ask):
+    expected = cleanup.clean(line(200), engine_of(name, arrays), passes=1)
+    engine, listener = exhausted(engine_of(name, arrays), ask, 2), Listener()
+    found = cleanup.clean(line(200), engine, passes=1, progress=listener)
+    np.testing.assert_array_equal(found.cells(), expected.cells())
+    assert listener.warnings == 2 * ["The computer has too little free memory: continuing with smaller parts."]
+    assert engine.max_cells == Engine.max_cells // 4**2
+
+
+@pytest.mark.parametrize(("name", "ask"), ASKS)
+def test_too_little_memory_for_the_smallest_parts_ends_the_run(arrays, name, ask):
+    engine = exhausted(engine_of(name, arrays), ask, 100)
+    with pytest.raises(MemoryError):
+        cleanup.clean(line(50), engine, passes=1)
+    assert MAX_PIECE_CELLS <= engine.max_cells < 4 * MAX_PIECE_CELLS
+
+
+def test_an_exhausted_card_is_replaced_by_the_cpu(arrays):
+    expected = cleanup.clean(line(200), engine_of("TORCH", arrays), passes=1)
+    engine, listener = exhausted(engine_of("TORCH", arrays), fill_the_card, 3), Listener()
+    engine._others = ["cpu"]
+    found = cleanup.clean(line(200), engine, passes=1, progress=listener)
+    np.testing.assert_array_equal(found.cells(), expected.cells())
+    assert ["on the CPU" in text for text in listener.warnings] == [False, False, True]
+    assert engine.max_cells == Engine.max_cells and engine._others == []
+
+
+def test_other_errors_are_passed_on(arrays):
+    engine = exhausted(engine_of("OPENCV", arrays), lambda: cv2.imdecode(None, 0), 1)
+    with pytest.raises(cv2.error):
+        cleanup.clean(line(50), engine, passes=1)
+
+
+def test_fields_with_context_give_the_result_of_one_field(arrays):
+    engine, raster = engine_of("TORCH", arrays), line(1000)
+    whole = cleanup.clean(raster, engine, passes=1)
+    engine.max_cells = 20_000
+    assert len(lay_fields(raster, engine.max_cells)) > 2
+    parts = cleanup.clean(raster, engine, passes=1)
+    assert whole.count() > 1000
+    np.testing.assert_array_equal(parts.cells(), whole.cells())

@@ -1,9 +1,12 @@
-"""The model for a rail standard."""
+"""The model for a rail standard; weights on disk: half precision, and what is refused."""
+
+import tracemalloc
+import zipfile
 
 import numpy as np
 import pytest
 from rail_extract.core.errors import ModelError
-from rail_extract.core.frpdf.models import AUTOMATIC, MODELS, choose
+from rail_extract.core.frpdf.models import AUTOMATIC, MAX_BYTES, MODELS, choose, load_arrays, save_arrays
 
 
 @pytest.mark.parametrize("standard", [(1.435, 0.0762), (1.0, 0.06191), (1.676, 0.0667)])
@@ -18,6 +21,52 @@ def test_a_model_is_chosen_by_its_name(model):
     assert model.path.exists()
 
 
-def test_a_ratio_that_no_model_covers_is_refused():
-    with pytest.raises(ModelError, match="GAUGE and HEAD_WIDTH"):
-        choose(1.435, 0.150)
+def test_weights_survive_the_file_in_half_precision(random_arrays, tmp_path):
+    save_arrays(tmp_path / "weights.npz", random_arrays)
+    loaded = load_arrays(tmp_path / "weights.npz")
+    assert loaded.keys() == random_arrays.keys()
+    for name, array in random_arrays.items():
+        assert loaded[name].dtype == np.float32
+        assert np.allclose(loaded[name], array, rtol=2**-11 if array.ndim == 4 else 0, atol=2**-24)
+    size = (tmp_path / "weights.npz").stat().st_size
+    assert size < 0.55 * sum(array.nbytes for array in random_arrays.values())
+
+
+def npy(header, data=b""):
+    """An array in numpy's format with any header."""
+    text = repr(header).encode().ljust(118) + b"\n"
+    return b"\x93NUMPY\x01\x00" + len(text).to_bytes(2, "little") + text + data
+
+
+BAD_ARRAYS = {
+    "gigabytes of zeros": npy({"descr": "<f4", "fortran_order": False, "shape": (2**26,)}, bytes(2**28)),
+    "gigabytes stated": npy({"descr": "<f4", "fortran_order": False, "shape": (2**40,)}, bytes(96)),
+    "values missing": npy({"descr": "<f4", "fortran_order": False, "shape": (24,)}, bytes(92)),
+    "negative length": npy({"descr": "<f4", "fortran_order": False, "shape": (-24,)}, bytes(96)),
+    "complex numbers": npy({"descr": "<c8", "fortran_order": False, "shape": (24,)}, bytes(192)),
+    "text": npy({"descr": "<U100000000", "fortran_order": False, "shape": (24,)}, bytes(96)),
+    "objects": npy({"descr": "|O", "fortran_order": False, "shape": (24,)}, b"\x80\x04]."),
+    "no array": b"weights",
+    "nothing": b"",
+}
+
+
+@pytest.mark.parametrize("fault", BAD_ARRAYS)
+def test_what_is_not_an_array_of_weights_is_refused_within_little_memory(tmp_path, fault):
+    path = tmp_path / "weights.npz"
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("layer.9.bias.npy", BAD_ARRAYS[fault])
+    assert path.stat().st_size < 300_000
+    tracemalloc.start()
+    try:
+        with pytest.raises(ModelError, match="weights.npz cannot be read"):
+            load_arrays(path)
+        assert tracemalloc.get_traced_memory()[1] < 2 * MAX_BYTES
+    finally:
+        tracemalloc.stop()
+
+
+def test_arrays_by_columns_are_read_as_numpy_reads_them(tmp_path):
+    array = np.asfortranarray(np.arange(6, dtype=np.float32).reshape(2, 3))
+    np.savez(tmp_path / "weights.npz", here=array)
+    assert np.array_equal(load_arrays(tmp_path / "weights.npz")["here"], array)

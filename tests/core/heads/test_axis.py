@@ -3,11 +3,10 @@ import pytest
 from rail_extract.core.clouds.points import RailPoints
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.heads.axis import UNSHOWN_M, Axis
-from rail_extract.core.heads.edges import station_count
 from rail_extract.core.heads.elevation import elevate
-from rail_extract.core.heads.head_points import HeadPoints, near_lines
+from rail_extract.core.heads.head_points import HeadPoints, near_lines, stations_along
 from rail_extract.core.heads.refinement import refine
-from rail_extract.core.lines.network_smoothing import smooth_network
+from rail_extract.core.lines.smoothing import smooth_network
 from rail_extract.core.polyline import interpolate, length_along, project
 from rail_extract.core.raster import cell_size, rasterize
 from rail_extract.core.vectorize import vectorize
@@ -32,7 +31,7 @@ def head(length, density, noise=0.003, seed=0):
 
 def axis(t, across, z, length=60.0, free=None):
     line = np.column_stack([np.linspace(0, length, int(10 * length) + 1), np.zeros(int(10 * length) + 1)])
-    free = np.ones((2, station_count(length)), dtype=bool) if free is None else free
+    free = np.ones((2, len(stations_along(length))), dtype=bool) if free is None else free
     return Axis.of(HeadPoints(t, across, z, WIDTH, line, free), UNSEEN)
 
 

@@ -1,15 +1,14 @@
 import numpy as np
 import pytest
 from rail_extract.core.heads.blunt import Ridge, wander
-from rail_extract.core.heads.edges import station_count
-from rail_extract.core.heads.head_points import HeadPoints
+from rail_extract.core.heads.head_points import HeadPoints, stations_along
 from scipy.ndimage import gaussian_filter1d
 
 WIDTH, LENGTH_M, BEND = 0.072, 40.0, 8.0
 
 
 def ridge_of(t, across, z):
-    line, free = np.array([[0.0, 0.0], [LENGTH_M, 0.0]]), np.ones((2, station_count(LENGTH_M)), dtype=bool)
+    line, free = np.array([[0.0, 0.0], [LENGTH_M, 0.0]]), np.ones((2, len(stations_along(LENGTH_M))), dtype=bool)
     return Ridge.find(HeadPoints(t, across, z, WIDTH, line, free))
 
 

@@ -4,7 +4,7 @@ from rail_extract.core.clouds.points import RailPoints
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.heads.refinement import refine
 from rail_extract.core.lines.network import LineNetwork
-from rail_extract.core.lines.network_smoothing import smooth_network
+from rail_extract.core.lines.smoothing import smooth_network
 from rail_extract.core.polyline import project
 from rail_extract.core.raster import cell_size, rasterize
 from rail_extract.core.vectorize import vectorize

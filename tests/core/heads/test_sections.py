@@ -1,7 +1,6 @@
 import numpy as np
 import pytest
-from rail_extract.core.heads.edges import station_count, stations_along
-from rail_extract.core.heads.head_points import HeadPoints
+from rail_extract.core.heads.head_points import HeadPoints, stations_along
 from rail_extract.core.heads.sections import (
     VIEW_STATIONS,
     _pull,
@@ -29,7 +28,7 @@ def scanned(angle_deg, share=1.0, noise_m=0.005, seed=0, slope=0.0, bend_m=0.0, 
 
 
 def middles_of(points, seen=None):
-    seen = np.ones(station_count(LENGTH), dtype=bool) if seen is None else seen
+    seen = np.ones(len(stations_along(LENGTH)), dtype=bool) if seen is None else seen
     line = np.array([[0.0, 0.0], [LENGTH, 0.0]])
     return outline_middles(HeadPoints(*points, WIDTH, line, np.ones((2, len(seen)), dtype=bool)), seen)
 

@@ -9,12 +9,11 @@ RASTER = """
 import resource, sys
 from pathlib import Path
 import numpy as np
-from rail_extract.core.output.geotiff import write_rasters
 from rail_extract.core.disk import Destination
 from rail_extract.core.errors import DiskError
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.raster import rasterize
-from rail_extract.core.output.raster_file import header_for
+from rail_extract.core.output.raster_file import header_for, write_rasters
 from rail_extract.core.standards import STANDARDS
 resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))
 raster = rasterize(np.random.RandomState(1).uniform(0, 80, (200_000, 2)), 0.04)
@@ -35,7 +34,7 @@ from rail_extract.core.disk import Destination
 from rail_extract.core.errors import DiskError
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.output.layers import lines_layer
-from rail_extract.core.products import RAILS
+from rail_extract.core.fields import RAILS
 from rail_extract.core.rails import RailLine
 resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, 200_000))
 rails = [RailLine(np.random.rand(20_000, 3), 1, 10, 5, 1.0, 1.0, 0.0)]

@@ -6,8 +6,7 @@ import pytest
 rasterio = pytest.importorskip("rasterio")
 
 from rail_extract.core.frame import LocalFrame  # noqa: E402
-from rail_extract.core.output.geotiff import write_rasters  # noqa: E402
-from rail_extract.core.output.raster_file import header_for  # noqa: E402
+from rail_extract.core.output.raster_file import header_for, write_rasters  # noqa: E402
 from rail_extract.core.raster import TILE, cell_size, rasterize  # noqa: E402
 from rail_extract.core.standards import STANDARDS  # noqa: E402
 

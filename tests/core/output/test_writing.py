@@ -10,12 +10,11 @@ shapely = pytest.importorskip("shapely")
 
 from rail_extract.core.disk import Destination  # noqa: E402
 from rail_extract.core.errors import DiskError  # noqa: E402
-from rail_extract.core.fields import CENTERLINE_FIELDS, QUALITY_FIELDS, RAIL_FIELDS  # noqa: E402
+from rail_extract.core.fields import CENTERLINE_FIELDS, CENTERLINES, QUALITY_FIELDS, RAIL_FIELDS, RAILS  # noqa: E402  # noqa: E402
 from rail_extract.core.frame import LocalFrame  # noqa: E402
 from rail_extract.core.output.geopackage import tables_in  # noqa: E402
 from rail_extract.core.output.layers import lines_layer, quality_layer  # noqa: E402
 from rail_extract.core.output.writing import write_layers  # noqa: E402
-from rail_extract.core.products import CENTERLINES, RAILS  # noqa: E402
 from rail_extract.core.rails import Centerline, RailLine, TrackGeometry  # noqa: E402
 
 FRAME = LocalFrame(np.array([500.0, 7100.0, 30.0]), 0.5, 0.25, "EPSG:2227")

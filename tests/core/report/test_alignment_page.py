@@ -9,7 +9,7 @@ from rail_extract.core.alignment.deviations import Deviations
 from rail_extract.core.alignment.elements import Alignment, CantElement, Figures, VerticalElement, chained
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.report import build_alignment_page
-from rail_extract.core.report.alignment_plots import draw_alignment, measured_curvature, measured_grade
+from rail_extract.core.report.alignment import draw_alignment, measured_curvature, measured_grade
 from rail_extract.core.report.plots import LEFT, RIGHT, WIDTH
 
 SHAPES = [(200.0, 0, 0), (100.0, 0, 1 / 500), (300.0, 1 / 500, 1 / 500)]

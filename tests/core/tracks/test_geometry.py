@@ -2,16 +2,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rail_extract.core import pipeline, steps
+from rail_extract.core import pipeline
 from rail_extract.core.clouds.points import RailPoints
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.heads.elevation import elevate, measure_again
 from rail_extract.core.heads.head_points import near_lines
 from rail_extract.core.heads.refinement import refine
-from rail_extract.core.lines.network_smoothing import smooth_network
-from rail_extract.core.lines.thinning import thin
+from rail_extract.core.lines.finishing import thin
+from rail_extract.core.lines.smoothing import smooth_network
 from rail_extract.core.rails import NO_GAPS, Centerline, RailLine, Support
 from rail_extract.core.raster import cell_size, rasterize
+from rail_extract.core.squares import steps
 from rail_extract.core.tracks.centerlines import build_centerlines
 from rail_extract.core.tracks.geometry import PROFILE_SIGMA_M, measure_track_geometry
 from rail_extract.core.vectorize import vectorize

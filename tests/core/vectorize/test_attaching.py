@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from rail_extract.core.lines.bridges import MISFIT_M
+from rail_extract.core.lines.ends import MISFIT_M
 from rail_extract.core.lines.network import LineNetwork
 from rail_extract.core.vectorize.attaching import attach_branches
 from rail_extract.laboratory.curves import Element, trace

@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-from rail_extract.core.lines.bridges import MISFIT_M
-from rail_extract.core.lines.ends import even_points
+from rail_extract.core.lines.ends import MISFIT_M, even_points
 from rail_extract.core.lines.network import LineNetwork
 from rail_extract.core.raster import cell_size, rasterize
 from rail_extract.core.vectorize import vectorize

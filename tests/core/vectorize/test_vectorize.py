@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 from rail_extract.core.errors import Cancelled
-from rail_extract.core.lines.network_smoothing import smooth_network
+from rail_extract.core.lines.smoothing import smooth_network
 from rail_extract.core.polyline import length_along
 from rail_extract.core.progress import Progress
 from rail_extract.core.raster import RailRaster

@@ -8,7 +8,6 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -317,7 +316,7 @@ def test_the_memory_of_this_computer_is_known():
     assert 2**28 < runner_module.memory_bytes() < 2**46
 
 
-def test_lines_are_the_same_to_the_last_bit(functions, tiles, tmp_path):
+def test_lines_are_the_same_to_the_last_bit(functions, tiles, tmp_path, difference):
     parameters = Parameters(1.435, 0.072, passes=1, engine="OPENCV", square_tiles=4, quality_step_m=1.0)
     found = []
     for count in (1, 2, 3):
@@ -329,19 +328,3 @@ def test_lines_are_the_same_to_the_last_bit(functions, tiles, tmp_path):
     for other in found[1:]:
         for name in vars(found[0]):
             assert difference(getattr(other, name), getattr(found[0], name)) is None
-
-
-def difference(one, other, where="differs"):
-    """Return where two results differ by a bit; None if they do not."""
-    if isinstance(one, np.ndarray):
-        same = (one.dtype, one.shape, one.tobytes()) == (other.dtype, other.shape, other.tobytes())
-        return None if same else where
-    if isinstance(one, (tuple, list)):
-        parts = [(f"[{number}]", *pair) for number, pair in enumerate(zip(one, other))]
-        found = None if len(one) == len(other) else where
-    elif hasattr(one, "__dict__"):
-        parts = [(f".{name}", vars(one)[name], vars(other)[name]) for name in vars(one)]
-        found = None
-    else:
-        return None if type(one) is type(other) and (one == other or one != one) else where
-    return next(filter(None, (difference(*pair, where + name) for name, *pair in parts)), found)

@@ -1,7 +1,7 @@
 import pytest
 from qgis.core import QgsCoordinateReferenceSystem, QgsPointCloudLayer, QgsProject, QgsProperty, QgsVectorLayer
 from rail_extract.core.clouds.readers import read_header
-from rail_extract.core.clouds.vpc import CatalogueTile, catalogue_text
+from rail_extract.core.clouds.vpc import catalogue_text
 from rail_extract.core.errors import CloudError
 from rail_extract.rail_extract_plugin.reading.clouds import CloudSource, cloud_source
 
@@ -41,9 +41,7 @@ def catalogue_layer(path, context):
     """A layer of a virtual point cloud that states a coordinate system; QGIS reads these from 3.32 on."""
     header = read_header(path)
     wkt = QgsCoordinateReferenceSystem("EPSG:32643").toWkt()
-    path.with_name("all.vpc").write_text(
-        catalogue_text([CatalogueTile(path.name, header.point_count, header.extent)], wkt)
-    )
+    path.with_name("all.vpc").write_text(catalogue_text([(path.name, header.point_count, header.extent)], wkt))
     layer = QgsPointCloudLayer(str(path.with_name("all.vpc")), "my tiles", "vpc")
     if not layer.isValid():
         pytest.skip("this QGIS has no layers of virtual point clouds")

@@ -24,8 +24,8 @@ from qgis.core import (
 )
 from qgis.PyQt.QtCore import QSize
 from qgis.PyQt.QtGui import QColor
+from rail_extract.core.fields import PRODUCTS
 from rail_extract.core.frame import LocalFrame
-from rail_extract.core.products import PRODUCTS
 from rail_extract.rail_extract_plugin import compat
 from rail_extract.rail_extract_plugin.paths import STYLES
 from rail_extract.rail_extract_plugin.reading.clouds import CloudSource

@@ -1,0 +1,100 @@
+"""Cross-sections: the points around single places of a cloud, which is read once for all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..polyline import interpolate, length_along
+from ..progress import SILENT, Progress
+from .points import Request
+from .readers import CloudHeader
+
+
+@dataclass(frozen=True)
+class CrossSection:
+    """A vertical plane across a line.
+
+    Attributes
+    ----------
+    place : (3,) array
+        Place on the line, metres; the height may be NaN.
+    direction : (2,) array
+        Unit vector along the line.
+    """
+
+    place: np.ndarray
+    direction: np.ndarray
+
+    def seen(self, xyz: np.ndarray) -> np.ndarray:
+        """Return points, (n, 3) metres, as seen along the line, (n, 3): ahead, to the right, up.
+
+        >>> CrossSection(np.array([10.0, 20.0, 5.0]), np.array([0.0, 1.0])).seen(np.array([[11.0, 22.0, 5.5]])).tolist()
+        [[2.0, 1.0, 0.5]]
+        """
+        east, north, up = (xyz - self.place).T
+        x, y = self.direction
+        return np.column_stack([east * x + north * y, east * y - north * x, up])
+
+    def crossings(self, line: np.ndarray) -> np.ndarray:
+        """Return where a line, (n, 3) metres, crosses the plane, (k, 2): to the right, up."""
+        ahead, right, up = self.seen(line).T
+        numbers = np.flatnonzero((ahead[:-1] < 0) != (ahead[1:] < 0))
+        share = ahead[numbers] / (ahead[numbers] - ahead[numbers + 1])
+        return np.column_stack([one[numbers] + share * (one[numbers + 1] - one[numbers]) for one in (right, up)])
+
+
+def cross_section_at(line: np.ndarray, share: float) -> CrossSection:
+    """Return the plane across a line, (n, 3) metres, at a share of its plan length."""
+    along = length_along(line[:, :2])
+    at = share * along[-1]
+    segment = int(np.clip(np.searchsorted(along, at, side="right") - 1, 0, len(line) - 2))
+    place = interpolate(line, along, np.array([at]))[0]
+    step = line[segment + 1, :2] - line[segment, :2]
+    return CrossSection(place, step / np.hypot(*step))
+
+
+def points_near(
+    request: Request, places: Sequence[np.ndarray], reach_m: float, progress: Progress = SILENT
+) -> list[np.ndarray]:
+    """Read the points around places, each file once; files without a place are skipped.
+
+    Parameters
+    ----------
+    request : Request
+    places : sequence of (3,) arrays
+        Metres from the zero of the coordinate system, as `request.zero` converts them.
+    reach_m : float
+        Distance in plan.
+    progress : Progress
+
+    Returns
+    -------
+    list of (n, 3) arrays
+        Points around each place, metres like `places`.
+    """
+    found: list[list[np.ndarray]] = [[np.empty((0, 3))] for _ in places]
+    plan = np.array([place[:2] for place in places]).reshape(-1, 2)
+    tree = cKDTree(plan)
+    for header, share in zip(request.headers, request.shares(progress)):
+        if not _reaches(header, request, plan, reach_m):
+            continue
+        for xyz, *_ in request.read(header, share):
+            local = request.zero.to_local(xyz)
+            local = local[tree.query(local[:, :2])[0] <= reach_m]
+            for number in range(len(plan)) if len(local) else ():
+                near = local[np.hypot(*(local[:, :2] - plan[number]).T) <= reach_m]
+                if len(near):
+                    found[number].append(near)
+    return [np.concatenate(parts) for parts in found]
+
+
+def _reaches(header: CloudHeader, request: Request, plan: np.ndarray, reach_m: float) -> bool:
+    """Return whether a place is within reach of a file's extent; an extent of NaN may be anywhere."""
+    west, south, east, north = np.array(header.extent) * request.zero.horizontal_unit_m
+    x, y = plan.T
+    away = (x < west - reach_m) | (x > east + reach_m) | (y < south - reach_m) | (y > north + reach_m)
+    return not away.all()

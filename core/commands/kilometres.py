@@ -1,0 +1,172 @@
+"""Kilometres of features along axes, for the commands that take an axis."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyogrio
+import shapely
+
+from ..alignment.placed_axes import AXIS_IN_DEGREES, NAME_FIELDS, PlacedAxes, check_jumps, km_of, post_field
+from ..alignment.stationing import Jump
+from ..alignment.stations import Axes, AxisLine, Post, Start, make_axes
+from ..clouds.crs import is_geographic, parse_crs, units
+from ..disk import Destination
+from ..errors import CrsError, MissingError, ParameterError
+from ..fields import EXTENT_FIELDS, STATION_FIELDS, UNKNOWN_IN_METRES, Field
+from ..output.geopackage import geometries_in
+from ..output.writing import as_os_error, column_of
+from ..progress import Progress
+from ..rails import Kilometres
+from .vectors import LAYER, Features, read_features
+
+
+def _with_measures(features: Features, file: str) -> Features:
+    """Return the features of a GeoPackage with the M values of their geometries, which GDAL's arrays lack."""
+    path, _, layer = file.partition(LAYER)
+    if Path(path).suffix.lower() != ".gpkg":
+        return features
+    stored = geometries_in(Path(path), layer or str(pyogrio.list_layers(path)[0, 0]))
+    return replace(features, shapes=shapely.from_wkb([stored.get(int(number)) for number in features.ids]))
+
+
+def read_axes(args: argparse.Namespace, places: str | None, plane: str | None = None) -> tuple[PlacedAxes, str | None]:
+    """Read the axes that the options state; also return the coordinate system of their plane.
+
+    Parameters
+    ----------
+    args : Namespace
+        With `axis` and the options of `options.add_axis_arguments`.
+    places : str or None
+        Coordinate system of what is to be located.
+    plane : str, optional
+        Coordinate system of the plane; else it is that of the axis, or of the places if the axis is in degrees.
+
+    Raises
+    ------
+    CrsError, ParameterError, RailExtractError
+        A file lacks what it should state, or they contradict each other.
+    """
+    features = _with_measures(read_features(args.axis, "AXIS"), args.axis)
+    stated_systems = [one for one in (plane, features.crs_wkt, places) if one]
+    crs_wkt = next((one for one in stated_systems if not is_geographic(parse_crs(one))), None)
+    if crs_wkt is None and stated_systems:
+        raise CrsError(AXIS_IN_DEGREES)
+    unit_m = units(parse_crs(crs_wkt))[0] if crs_wkt else 1.0
+    lines = list(_axis_lines(features, crs_wkt, unit_m))
+    if not lines:
+        raise MissingError("AXIS", "line")
+    start = None if args.start_km is None else Start(args.start_km, args.decreasing)
+    posts = _posts(read_features(args.posts, "POSTS"), args.post_field, crs_wkt, unit_m) if args.posts else []
+    made = make_axes(lines, start, posts, _jumps(read_features(args.jumps, "JUMPS")) if args.jumps else [])
+    return PlacedAxes(Axes(made.axes, made.notices), unit_m, args.format), crs_wkt
+
+
+def located(
+    features: Features, axes: PlacedAxes, crs_wkt: str | None, progress: Progress
+) -> tuple[tuple[Field, ...], list[Any]]:
+    """Find the kilometres of features; return their fields, and the values of each.
+
+    Parameters
+    ----------
+    features : Features
+    axes : PlacedAxes
+    crs_wkt : str or None
+        Of the plane of the axes.
+    progress : Progress
+    """
+    shapes = features.in_plane(crs_wkt)
+    places = np.array([_place(shape) for shape in shapes]).reshape(-1, 2)
+    known = np.isfinite(places).all(axis=1)
+    kilometres = Kilometres.empty(len(shapes))
+    kilometres.put(known, axes.locate(places[known], progress))
+    columns = [getattr(kilometres, field.name) for field in STATION_FIELDS]
+    if all(shape is None or "Point" in shape.geom_type for shape in shapes):
+        return STATION_FIELDS, columns
+    xy, numbers = shapely.get_coordinates(shapes, return_index=True)
+    extents, km = np.full((len(shapes), 2), np.nan), axes.kilometres(xy, progress).km
+    np.fmin.at(extents[:, 0], numbers, km)
+    np.fmax.at(extents[:, 1], numbers, km)
+    return (*STATION_FIELDS, *EXTENT_FIELDS), [*columns, *extents.T]
+
+
+def _place(shape: shapely.Geometry | None) -> np.ndarray:
+    """Return where a feature counts, (2,): half way along a line, inside a polygon, in the mean of points."""
+    if shape is None or shape.is_empty:
+        return np.full(2, np.nan)
+    if "Line" in shape.geom_type:
+        shape = shapely.line_interpolate_point(shapely.line_merge(shape), 0.5, normalized=True)
+    elif "Polygon" in shape.geom_type:
+        shape = shapely.point_on_surface(shape)
+    return np.array(shapely.get_coordinates(shapely.centroid(shape))[0])
+
+
+def _axis_lines(features: Features, crs_wkt: str | None, unit_m: float) -> Iterator[AxisLine]:
+    """Yield the parts of all lines that have a length."""
+    named = next((name for name in NAME_FIELDS if name in features.columns), None)
+    for row, shape, moved in zip(features.rows(), features.shapes, features.in_plane(crs_wkt)):
+        for part, placed in zip(shapely.get_parts(shape), shapely.get_parts(moved)):
+            if part.geom_type == "LineString" and part.length > 0:
+                m = shapely.get_coordinates(part, include_m=True)[:, 2]
+                yield AxisLine(str((named and row[named]) or ""), shapely.get_coordinates(placed) * unit_m, m)
+
+
+def _posts(features: Features, field: str | None, crs_wkt: str | None, unit_m: float) -> list[Post]:
+    """Return the posts."""
+    name = field or post_field(features.columns)
+    if name not in features.columns:
+        raise ParameterError(f"POSTS has no field {name}: it has {', '.join(features.columns)}.")
+    rows = features.rows()
+    found = [
+        Post(xy * unit_m, km_of(rows[number][name], name, "POSTS", int(features.ids[number])))
+        for number, place in features.parts(crs_wkt, "Point")
+        for xy in shapely.get_coordinates(place)
+    ]
+    if not found:
+        raise MissingError("POSTS", "point")
+    return found
+
+
+def _jumps(features: Features) -> list[Jump]:
+    """Return the jumps of a table."""
+    check_jumps(features.columns)
+    return [
+        Jump(*(km_of(row[name], name, "JUMPS", int(feature)) for name in ("km_back", "km_ahead")))
+        for feature, row in zip(features.ids, features.rows())
+    ]
+
+
+def write_copy(
+    destination: Destination, source: Features, fields: Sequence[Field], columns: Sequence[Sequence[Any]]
+) -> None:
+    """Write the features of a layer with further fields into a GeoPackage.
+
+    Parameters
+    ----------
+    destination : Destination
+    source : Features
+    fields : sequence of Field
+    columns : sequence of sequence
+        Values of each further field, one per feature.
+    """
+    further = [column_of(field, [field.value(value) for value in values]) for field, values in zip(fields, columns)]
+    kept = {name: values for name, values in source.columns.items() if name not in {field.name for field in fields}}
+    kinds = {shape.geom_type for shape in source.shapes if shape is not None}
+    with destination.replacing() as new, as_os_error():
+        pyogrio.raw.write(
+            str(new),
+            layer="stations",
+            driver="GPKG",
+            geometry=np.array([shapely.to_wkb(shape, output_dimension=4) for shape in source.shapes], dtype=object),
+            geometry_type=kinds.pop() if len(kinds) == 1 else "Unknown",
+            field_data=[*kept.values(), *(column for column, _ in further)],
+            field_mask=[*(None for _ in kept), *(empty for _, empty in further)],
+            fields=[*kept, *(field.name for field in fields)],
+            crs=source.crs_wkt or UNKNOWN_IN_METRES,
+            nan_as_null=True,
+        )

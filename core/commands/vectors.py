@@ -1,0 +1,360 @@
+"""Vector files: lines, points, polygons and tables with their fields, for the commands that take them."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyogrio
+import shapely
+
+from ..airborne.survey import Guide, gauge_of
+from ..alignment.cant_of_rails import cant_of_rails
+from ..alignment.elements import Alignment
+from ..alignment.measured import Track, stations_by_track, with_cant
+from ..alignment.table import alignments, check_table, frame_of
+from ..clouds.crs import import_pyproj, is_geographic, name_of, parse_crs, same_plane, units
+from ..clouds.mask import Mask
+from ..comparison.tracks import SurveyedLine
+from ..errors import CrsError, MissingError, ParameterError
+from ..frame import ORIGIN_STEP, LocalFrame
+from ..rails import RailLine
+
+LAYER = "|layername="
+"""What separates a file from the layer in it, as QGIS writes it."""
+
+
+@dataclass(frozen=True)
+class Features:
+    """Features of a layer.
+
+    Attributes
+    ----------
+    option : str
+        Option that named the file, or the file, for messages.
+    crs_wkt : str or None
+    ids : (n,) int array
+    shapes : (n,) object array
+        Geometries; None where there is none.
+    columns : dict of str to (n,) array
+        Values by the name of the field.
+    """
+
+    option: str
+    crs_wkt: str | None
+    ids: np.ndarray
+    shapes: np.ndarray
+    columns: dict[str, np.ndarray]
+
+    def rows(self) -> list[dict[str, Any]]:
+        """Return the values of each feature; None where a field is empty."""
+        return [
+            {name: _plain(values[number]) for name, values in self.columns.items()} for number in range(len(self.ids))
+        ]
+
+    @property
+    def system(self) -> tuple[str | None, float, float]:
+        """Coordinate system, and its units in plan and in height, metres.
+
+        Raises
+        ------
+        CrsError
+            It is in degrees.
+        """
+        if self.crs_wkt is None:
+            return None, 1.0, 1.0
+        crs = parse_crs(self.crs_wkt)
+        if is_geographic(crs):
+            raise CrsError(
+                f"{self.option} is in degrees ({name_of(crs)}), where lengths can't be measured: reproject it, for "
+                "example to the UTM zone of the place."
+            )
+        return (self.crs_wkt, *units(crs))
+
+    def lines(self) -> tuple[list[tuple[int, dict[str, Any], np.ndarray]], LocalFrame]:
+        """Return feature id, values and vertices, (n, 3) local metres, of each line; z is NaN without heights.
+
+        Raises
+        ------
+        CrsError
+            The lines are in degrees.
+        ParameterError
+            There are none.
+        """
+        rows = self.rows()
+        found = [(int(self.ids[n]), rows[n], _vertices(part)) for n, part in self.parts(None, "LineString")]
+        if not found:
+            raise MissingError(self.option, "line")
+        crs_wkt, horizontal_unit_m, vertical_unit_m = self.system
+        middle = np.median(np.concatenate([xyz for _, _, xyz in found]), axis=0)
+        origin = np.round(np.nan_to_num(middle) / ORIGIN_STEP) * ORIGIN_STEP
+        frame = LocalFrame(origin, horizontal_unit_m, vertical_unit_m, crs_wkt)
+        return [(feature, row, frame.to_local(xyz)) for feature, row, xyz in found], frame
+
+    def in_plane(self, crs_wkt: str | None) -> np.ndarray:
+        """Return the geometries in another coordinate system; as they are if either is unknown."""
+        if not (crs_wkt and self.crs_wkt):
+            return self.shapes
+        change = import_pyproj().Transformer.from_crs(parse_crs(self.crs_wkt), parse_crs(crs_wkt), always_xy=True)
+        with _explained(self.option):
+            return shapely.transform(self.shapes, lambda xy: np.column_stack(change.transform(*xy.T)))
+
+    def parts(self, crs_wkt: str | None, *kinds: str) -> Iterator[tuple[int, shapely.Geometry]]:
+        """Yield row and geometry of the points, lines or polygons of some kinds, in another coordinate system.
+
+        Those that the system does not cover, and those without a length, are left out.
+        """
+        for number, part in zip(*shapely.get_parts(self.in_plane(crs_wkt), return_index=True)[::-1]):
+            known = not part.is_empty and np.isfinite(shapely.get_coordinates(part)).all()
+            if part.geom_type in kinds and known and (part.geom_type == "Point" or part.length > 0):
+                yield int(number), part
+
+
+def read_features(file: str | Path, option: str = "", columns: Sequence[str] | None = None) -> Features:
+    """Read the features of a file; pyogrio drops M values.
+
+    Parameters
+    ----------
+    file : str or Path
+        A vector file; `FILE|layername=NAME` names a layer, else its first one is read.
+    option : str
+        Option that names it, for messages; these else name the file.
+    columns : sequence of str, optional
+        Fields to read, as far as there are any; else all.
+
+    Raises
+    ------
+    ParameterError
+        It can't be read.
+    """
+    path, _, layer = str(file).partition(LAYER)
+    if Path(path).is_fifo():
+        raise ParameterError(f"{path} is a pipe, not a file: give a GeoPackage or GeoJSON file.")
+    with _explained(f"{option} {file}".strip()), warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # of the M values, which only an axis needs
+        chosen = {"layer": layer or None, "columns": columns}
+        meta, ids, shapes, values = pyogrio.raw.read(Path(path), return_fids=True, **chosen)
+        found = shapely.from_wkb(shapes) if shapes is not None else np.full(len(ids), None)
+    return Features(option or str(file), meta["crs"], ids, found, dict(zip(meta["fields"].tolist(), values)))
+
+
+@contextmanager
+def _explained(name: str) -> Iterator[None]:
+    """Turn what GDAL, PROJ and GEOS raise because of a file into a `ParameterError` that names the file."""
+    try:
+        yield
+    except (RuntimeError, ValueError, shapely.errors.ShapelyError) as error:
+        raise ParameterError(
+            f"{name} can't be read as a vector file: give a GeoPackage or GeoJSON file, or a table."
+        ) from error
+
+
+def read_lines(file: Path, crs_wkt: str | None) -> list[np.ndarray]:
+    """Read the lines of a file, (k, 2) each, in a coordinate system; as they are if either is unknown.
+
+    Raises
+    ------
+    ParameterError
+        The file can't be read, or has no lines.
+    """
+    found = read_features(file, columns=()).parts(crs_wkt, "LineString")
+    lines = [shapely.get_coordinates(line) for _, line in found]
+    if not lines:
+        raise ParameterError(f"{file} has no lines: give lines along the tracks.")
+    return lines
+
+
+def read_guides(file: Path, crs_wkt: str | None) -> list[Guide]:
+    """Read the lines of a file with the name, reference and gauge that it states of them; see `read_lines`.
+
+    Raises
+    ------
+    ParameterError
+        The file can't be read, or has polygons, or no lines.
+    """
+    features = read_features(file, columns=("name", "ref", "gauge"))
+    if any("Polygon" in shape.geom_type for shape in features.shapes if shape is not None):
+        raise ParameterError(f"{file} has polygons: give lines along the tracks, one for each.")
+    rows = features.rows()
+    guides = [
+        Guide(
+            int(features.ids[number]),
+            shapely.get_coordinates(line),
+            gauge_of(rows[number].get("gauge")),
+            *(_word(rows[number].get(name)) for name in ("name", "ref")),
+        )
+        for number, line in features.parts(crs_wkt, "LineString")
+    ]
+    if not guides:
+        raise ParameterError(f"{file} has no lines: give lines along the tracks.")
+    return guides
+
+
+def read_seeds(file: Path, crs_wkt: str | None) -> list[np.ndarray]:
+    """Read the points, (1, 2) each, and the lines, (k, 2) each, of a file; see `read_lines`.
+
+    Raises
+    ------
+    ParameterError
+        The file can't be read, or has neither points nor lines.
+    """
+    found = read_features(file, columns=()).parts(crs_wkt, "Point", "LineString")
+    seeds = [shapely.get_coordinates(seed) for _, seed in found]
+    if not seeds:
+        raise ParameterError(f"{file} has neither points nor lines: give places on railheads.")
+    return seeds
+
+
+def read_mask(file: Path, crs_wkt: str | None) -> Mask:
+    """Read the polygons of a file, of which overlaps count once; see `read_lines`.
+
+    Raises
+    ------
+    ParameterError
+        The file can't be read, or has no polygons.
+    """
+    areas = [area for _, area in read_features(file, columns=()).parts(crs_wkt, "Polygon") if area.area > 0]
+    if not areas:
+        raise ParameterError(f"{file} has no polygons: give polygons around the tracks.")
+    with _explained(str(file)):
+        united = shapely.get_parts(shapely.union_all(shapely.make_valid(areas)))
+    return Mask.of([shapely.get_coordinates(ring) for ring in shapely.get_rings(united)])
+
+
+def read_tracks(
+    lines: str, quality: str | None, rails: str | None, option: str = "LINES"
+) -> tuple[list[Track], LocalFrame]:
+    """Read centerlines with their cant: from the track geometry, else from the rails; `option` names the lines.
+
+    Raises
+    ------
+    CrsError, ParameterError
+        A file has no lines, lacks a field, or states the cant of other tracks.
+    """
+    found, frame = read_features(lines, option).lines()
+    tracks = [(_whole(row.get("track_id"), feature), xyz) for feature, row, xyz in found]
+    if quality is not None:
+        features = read_features(quality, "--quality")
+        stations = stations_by_track(features.rows(), features.columns, "--quality")
+        return with_cant(tracks, stations, "--quality", option), frame
+    shapes = [] if rails is None else [xyz for _, _, xyz in _lines_in(read_features(rails, "--rails"), frame)]
+    return [
+        Track(number, xyz, cant_of_rails(xyz, shapes), np.zeros(len(xyz), dtype=bool)) for number, xyz in tracks
+    ], frame
+
+
+def read_elements(file: str, option: str, crs: str | None = None) -> list[Alignment]:
+    """Read the alignments of an element table; `crs` is that of a table without geometries.
+
+    Raises
+    ------
+    CrsError, ParameterError, RailExtractError
+        It is not an element table, an element is wrong, or it is in degrees.
+    """
+    found = read_features(file, option)
+    check_table(found.columns, option)
+    rows = found.rows()
+    stated = found.crs_wkt or (parse_crs(crs).to_wkt() if crs else None)
+    return alignments(rows, frame_of(rows, replace(found, crs_wkt=stated).system, option))
+
+
+def read_survey(file: str, option: str, frame: LocalFrame | None) -> tuple[list[SurveyedLine], LocalFrame]:
+    """Read the lines of a survey with their standard errors, in a frame or in one of their own.
+
+    A line's number is its `rail_id`, else its `track_id`, else the id of its feature. With a `track_id` only, it is a
+    centerline.
+    """
+    features = read_features(file, option)
+    found, own = features.lines()
+    if frame is not None:
+        found, own = _lines_in(features, frame), frame
+    named = next((name for name in ("rail_id", "track_id") if name in features.columns), "")
+    return [
+        SurveyedLine(
+            _whole(row.get(named), feature),
+            xyz,
+            _number(row.get("sigma_mm")) / 1000,
+            _number(row.get("sigmaz_mm")) / 1000,
+            named != "track_id",
+        )
+        for feature, row, xyz in found
+    ], own
+
+
+def read_rails(file: str, option: str, frame: LocalFrame) -> list[RailLine]:
+    """Read rails with their standard errors, in a frame."""
+    return [
+        RailLine(
+            xyz,
+            _whole(row.get("rail_id"), feature),
+            _whole(row.get("class_code"), 0),
+            _number(row.get("points")),
+            _number(row.get("resid_mm")),
+            _number(row.get("sigma_mm")),
+            _number(row.get("bridged_m")),
+            sigmaz_mm=_number(row.get("sigmaz_mm")),
+        )
+        for feature, row, xyz in _lines_in(read_features(file, option), frame)
+    ]
+
+
+def _lines_in(features: Features, frame: LocalFrame) -> list[tuple[int, dict[str, Any], np.ndarray]]:
+    """Return the lines in a frame.
+
+    Raises
+    ------
+    CrsError
+        Their coordinate system is another one.
+    """
+    found, own = features.lines()
+    shift = shift_between(features.option, own, frame)
+    return [(feature, row, xyz + shift) for feature, row, xyz in found]
+
+
+def shift_between(option: str, own: LocalFrame, frame: LocalFrame) -> np.ndarray:
+    """Return what moves places, (3,) metres, of the lines that an option names into another frame.
+
+    Raises
+    ------
+    CrsError
+        Their coordinate system is another one.
+    """
+    if own.crs_wkt and frame.crs_wkt and not same_plane(own.crs_wkt, frame.crs_wkt, tuple(frame.origin[:2])):
+        names = (name_of(parse_crs(wkt)) for wkt in (own.crs_wkt, frame.crs_wkt))
+        raise CrsError(
+            f"{option} is in {next(names)} but the other lines in {next(names)}: give both in the same coordinate "
+            "system."
+        )
+    return own.shift_to(frame)
+
+
+def _vertices(line: shapely.LineString) -> np.ndarray:
+    """Return the vertices of a line, (n, 3), without those that repeat the one before."""
+    xyz = shapely.get_coordinates(line, include_z=True)
+    if not np.isfinite(xyz[:, 2]).all():
+        xyz[:, 2] = np.nan
+    return xyz[np.append(True, np.any(np.diff(xyz[:, :2], axis=0) != 0, axis=1))]
+
+
+def _plain(value: Any) -> Any:
+    """Return a value of a field; None where it is empty."""
+    value = value.item() if isinstance(value, np.generic) else value
+    return None if value is None or value != value else value
+
+
+def _number(value: Any) -> float:
+    return float(value) if isinstance(value, (int, float)) else math.nan
+
+
+def _word(value: Any) -> str:
+    return "" if value is None else str(value)
+
+
+def _whole(value: Any, default: int) -> int:
+    return int(value) if isinstance(value, (int, float)) and float(value).is_integer() else default

@@ -1,0 +1,328 @@
+"""The steps of the walk, each on one square or one class: raster, network, lines, heights, tracks."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from typing import TypeVar
+
+import numpy as np
+
+from ..classify.thin import SURROUNDINGS_M, drawn
+from ..clouds.points import RailPoints
+from ..errors import NoTrackError, ParameterError
+from ..frame import LocalFrame
+from ..frpdf.cleanup import MARGIN, clean, max_passes
+from ..frpdf.engine import Engine, make_engine
+from ..frpdf.models import choose, load_arrays
+from ..heads.elevation import ElevationParameters, elevate, flat_rail, flat_rails, numbered
+from ..heads.head_points import near_lines
+from ..heads.refinement import refine
+from ..heads.roads import onto_heads
+from ..heads.strips import measure_strips, rows_of
+from ..lines.ends import FIT_M
+from ..lines.finishing import MAX_TURN_DEG, parts_without_turns, thin
+from ..lines.network import LineNetwork
+from ..lines.smoothing import smooth_network
+from ..parameters import ALIGNED, Parameters
+from ..polyline import length_along
+from ..progress import SILENT, Progress
+from ..rails import Centerline, RailLine
+from ..raster import TILE, RailRaster, cell_size, rasterize
+from ..standards import distinct_gauges
+from ..tracks.centerlines import CenterlineParameters, build_centerlines
+from ..tracks.parallels import widths_by_gauge
+from ..vectorize import vectorize
+from .grid import HALO_M, OVERLAP_M, Key, PointSource, Square, mosaic, own_tiles
+from .pieces import SquareRails, trim
+from .seams import join
+
+VECTORIZE, SMOOTH, REFINE, ELEVATE = 0.45, 0.05, 0.25, 0.25
+"""Relative run times of the steps from a raster to lines, for the progress."""
+
+
+def square_side(parameters: Parameters) -> float:
+    """Return the side of the squares in metres.
+
+    Raises
+    ------
+    ParameterError
+        The squares would overlap with more than their neighbours.
+    """
+    tile_m = _tile_side(parameters)
+    smallest = math.ceil(OVERLAP_M / tile_m)
+    if parameters.square_tiles < smallest:
+        raise ParameterError(f"Squares of {parameters.square_tiles} tiles are too small: give {smallest} at least.")
+    return parameters.square_tiles * tile_m
+
+
+def overlap_tiles(parameters: Parameters) -> int:
+    """Return the number of tiles around a square from which its lines are drawn as well.
+
+    The squares on both sides of a border must see the same surroundings of it: twice a gap together with the lines that
+    its bridge is fitted to on either side, and three sigma of the smoothing in height. However long the gaps, only the
+    neighbours are included.
+    """
+    reach_m = HALO_M + max(2 * (parameters.max_gap_m + 2 * FIT_M), 3 * (parameters.smoothing_z_m or 0.0))
+    return min(math.ceil(max(reach_m, OVERLAP_M) / _tile_side(parameters)), parameters.square_tiles)
+
+
+def _tile_side(parameters: Parameters) -> float:
+    """Return the side of a raster tile in metres."""
+    return TILE * cell_size(parameters.gauge_m, parameters.head_width_m)
+
+
+def engine_for(parameters: Parameters) -> Engine:
+    """Set up the engine with the weights that fit the gauge and the railhead."""
+    arrays = load_arrays(choose(parameters.gauge_m, parameters.head_width_m, parameters.model).path)
+    return make_engine(arrays, parameters.engine, parameters.device)
+
+
+def clean_square(
+    source: PointSource, square: Square, parameters: Parameters, engine: Engine, progress: Progress = SILENT
+) -> RailRaster:
+    """Rasterize the points of a square, clean the raster with the network, and keep the tiles inside the square.
+
+    The network also sees cells that are drawn along thin rails (docs/method.md section 2.4).
+    """
+    cell_m = cell_size(parameters.gauge_m, parameters.head_width_m)
+    margin_m = max_passes(parameters.passes) * MARGIN * cell_m
+    seen = _seen(source.near(square, margin_m + SURROUNDINGS_M).xyz, parameters, cell_m)
+    raster = rasterize(seen[square.holds(seen, margin_m)], cell_m)
+    return own_tiles(clean(raster, engine, parameters.passes, progress), square)
+
+
+def _seen(points: np.ndarray, parameters: Parameters, cell_m: float) -> np.ndarray:
+    """Return what the network sees, (n, 2) local metres: points, (m, 3), and places along thin rails."""
+    spacings_m = [gauge_m + head_m for gauge_m, head_m in parameters.gauges]
+    return np.concatenate([points[:, :2], drawn(points, spacings_m, cell_m)])
+
+
+def rails_of_square(
+    source: PointSource,
+    square: Square,
+    rasters: Mapping[Key, RailRaster],
+    parameters: Parameters,
+    progress: Progress = SILENT,
+) -> SquareRails:
+    """Draw the rails of a square.
+
+    Parameters
+    ----------
+    source : PointSource
+    square : Square
+    rasters : mapping of Key to RailRaster
+        Cleaned rasters of the square and of its neighbours; a neighbour may be missing.
+    parameters : Parameters
+    progress : Progress
+    """
+    tiles = overlap_tiles(parameters)
+    raster = mosaic(rasters, square, tiles)
+    overlap_m = tiles * _tile_side(parameters)
+    points = source.near(square, overlap_m)
+    if not square.is_whole_plane:
+        # A line may be longer than the part of it that the square shows; `whole_rails` drops the lines that are short.
+        parameters = replace(parameters, min_length_m=min(parameters.min_length_m, overlap_m - HALO_M))
+    rails, strips = _all_vertices(raster, source.class_code, points, parameters, progress)
+    return trim(rails, square, strips)
+
+
+def whole_rails(
+    results: Iterable[SquareRails],
+    frame: LocalFrame,
+    parameters: Parameters,
+    first_id: int = 1,
+    progress: Progress = SILENT,
+) -> list[RailLine]:
+    """Join the rails of all squares, drop the short ones, cut turns too sharp for a rail, simplify and number them.
+
+    Parameters
+    ----------
+    results : iterable of SquareRails
+        An iterator that lets go of what it yields saves a third of the memory of a long railway.
+    frame : LocalFrame
+        Local frame of the result.
+    parameters : Parameters
+    first_id : int
+    progress : Progress
+        Receives a warning if lines had to be cut.
+    """
+    rails = [rail for rail in join(results, frame) if rail.length_m >= parameters.min_length_m]
+    return _finished(numbered(rails), parameters, first_id, progress)
+
+
+def lines_of(
+    raster: RailRaster,
+    class_code: int,
+    points: RailPoints | None,
+    parameters: Parameters,
+    progress: Progress = SILENT,
+    first_id: int = 1,
+) -> list[RailLine]:
+    """Turn the cleaned raster of one class into rails: vectorize, smooth, move onto the heads, add heights, simplify.
+
+    Parameters
+    ----------
+    raster : RailRaster
+    class_code : int
+    points : RailPoints or None
+        Without points the rails stay where the raster shows them, and have no heights.
+    parameters : Parameters
+    progress : Progress
+    first_id : int
+        `rail_id` of the first rail.
+    """
+    drawn, _ = _all_vertices(raster, class_code, points, parameters, progress)
+    return _finished(drawn, parameters, first_id, progress)
+
+
+def _all_vertices(
+    raster: RailRaster, class_code: int, points: RailPoints | None, parameters: Parameters, progress: Progress
+) -> tuple[tuple[RailLine, ...], np.ndarray]:
+    """Turn the cleaned raster of one class into rails that have all their vertices, and list the offsets of strips.
+
+    See `strips.rows_of`.
+    """
+    drawing, measuring = progress.divide((VECTORIZE + SMOOTH, REFINE + ELEVATE))
+    network = draw_lines(raster, parameters, drawing)
+    return measure_lines(network, points, class_code, parameters, raster.cell_m, measuring)
+
+
+def draw_lines(raster: RailRaster, parameters: Parameters, progress: Progress = SILENT) -> LineNetwork:
+    """Draw the smoothed lines that a cleaned raster shows."""
+    vectorizing, smoothing = progress.divide((VECTORIZE, SMOOTH))
+    network = vectorize(
+        raster,
+        parameters.head_width_m,
+        parameters.max_gap_m,
+        parameters.gap_angle_deg,
+        parameters.min_length_m,
+        vectorizing,
+    )
+    return smooth_network(network, parameters.smoothing_xy_m, smoothing)
+
+
+def measure_lines(
+    network: LineNetwork,
+    points: RailPoints | None,
+    class_code: int,
+    parameters: Parameters,
+    cell_m: float,
+    progress: Progress = SILENT,
+) -> tuple[tuple[RailLine, ...], np.ndarray]:
+    """Move drawn lines onto their heads and measure them; see `_all_vertices`.
+
+    Parameters
+    ----------
+    network : LineNetwork
+        From `draw_lines`.
+    points : RailPoints or None
+    class_code : int
+    parameters : Parameters
+    cell_m : float
+        Cell size of the raster from which the lines were drawn.
+    progress : Progress
+    """
+    refining, elevating = progress.divide((REFINE, ELEVATE))
+    elevation = ElevationParameters(
+        tolerance_xy_m=parameters.tolerance_xy_m,
+        tolerance_z_m=parameters.tolerance_z_m,
+        crown_radius_m=parameters.crown_radius_m,
+        smoothing_z_m=parameters.smoothing_z_m,
+        cell_m=cell_m,
+        min_length_m=parameters.min_length_m,
+        align=parameters.strips == ALIGNED,
+    )
+    if points is None:
+        return flat_rails(network, class_code, elevation), rows_of((), ())
+    drawn = [flat_rail(line, class_code) for line in network.lines]
+    heads = widths_by_gauge(drawn, parameters.gauges, parameters.centerline_tolerance_m)
+    spacings_m = [sum(gauge) for gauge in parameters.gauges]
+    network = replace(network, lines=onto_heads(network.lines, points.xyz, heads, spacings_m))
+    network = refine(network, points, heads, parameters.smoothing_xy_m, refining, elevation.align, cell_m)
+    near = near_lines(network.lines, points.xyz, heads, points.strips, elevating.span(0.0, 0.6))
+    strips = [measure_strips(head) for head in near]
+    rails = elevate(network, near, class_code, elevation, elevating.span(0.6, 1.0), strips)
+    return rails, rows_of(network.lines, strips)
+
+
+def _finished(rails: Sequence[RailLine], parameters: Parameters, first_id: int, progress: Progress) -> list[RailLine]:
+    """Cut turns too sharp for a rail, simplify rails and number them from `first_id`."""
+    thinned = thin(_without_turns(rails, parameters, progress), parameters.simplify_xy_m, parameters.simplify_z_m)
+    return [replace(rail, rail_id=number) for number, rail in enumerate(thinned, start=first_id)]
+
+
+Line = TypeVar("Line", RailLine, Centerline)
+
+
+def _without_turns(lines: Sequence[Line], parameters: Parameters, progress: Progress) -> list[Line]:
+    """Split lines where they turn too sharply for rails, and warn the user."""
+    kept: list[Line] = []
+    turned: list[Line] = []
+    for line in lines:
+        parts = parts_without_turns(line.xyz[:, :2], parameters.min_length_m, parameters.smoothing_xy_m)
+        whole = len(parts) == 1 and np.ptp(parts[0]) >= length_along(line.xyz[:, :2])[-1]
+        kept += [line] if whole else [line.part(*part) for part in parts]
+        turned += [] if whole else [line]
+    if turned:
+        what = "rail" if isinstance(turned[0], RailLine) else "centerline"
+        count, was = (f"1 {what} bends", "it was") if len(turned) == 1 else (f"{len(turned)} {what}s bend", "they were")
+        before_m, after_m = (sum(line.length_m for line in some) for some in (lines, kept))
+        progress.warning(
+            f"{count} by more than {MAX_TURN_DEG:g}° within a metre, which rails cannot; {was} split there and "
+            f"{before_m - after_m:.1f} m dropped."
+        )
+    return kept
+
+
+def tracks_of(rails: Sequence[RailLine], parameters: Parameters, progress: Progress = SILENT) -> list[Centerline]:
+    """Pair the rails of each class at every gauge, and draw, simplify and number the centerlines.
+
+    Takes the rails as the user gets them, so that rails from a file give the same tracks.
+
+    Raises
+    ------
+    NoTrackError
+        Rails run parallel, but in no class at one of the gauges. If that is true of some classes only, the user is
+        warned instead.
+    """
+    codes = sorted({rail.class_code for rail in rails})
+    centerlines: list[Centerline] = []
+    errors: dict[int, NoTrackError] = {}
+    for code, share in zip(codes, progress.split(len(codes))):
+        try:
+            centerlines += tracks_of_class([rail for rail in rails if rail.class_code == code], parameters, share)
+        except NoTrackError as error:
+            errors[code] = error
+    if errors and not centerlines:
+        raise next(iter(errors.values()))
+    for code, without_track in errors.items():
+        progress.warning(f"Class {code}: {without_track}")
+    return [replace(line, track_id=number) for number, line in enumerate(centerlines, start=1)]
+
+
+def tracks_of_class(rails: Sequence[RailLine], parameters: Parameters, progress: Progress) -> tuple[Centerline, ...]:
+    """Pair the rails of one class; see `tracks_of`."""
+    settings = CenterlineParameters(
+        tolerance_m=parameters.centerline_tolerance_m,
+        max_gap_m=parameters.max_gap_m,
+        smoothing_m=parameters.smoothing_xy_m,
+        min_length_m=parameters.min_length_m,
+    )
+    distinct = distinct_gauges(parameters.gauges_m, parameters.centerline_tolerance_m)
+    gauges = [(gauge_m, dict(parameters.gauges)[gauge_m]) for gauge_m in distinct]
+    centerlines: list[Centerline] = []
+    errors: list[NoTrackError] = []
+    for one, step in zip(gauges, progress.split(len(gauges))):
+        settings = replace(settings, other_spacings_m=tuple(sum(other) for other in gauges if other != one))
+        try:
+            centerlines += build_centerlines(rails, *one, settings, step)
+        except NoTrackError as error:
+            errors.append(error)
+    if errors and not centerlines:
+        raise errors[0]
+    if not centerlines:
+        progress.warning("No two rails run parallel: there are rails but no track centerlines.")
+    whole = _without_turns(centerlines, parameters, progress)
+    return thin(whole, parameters.simplify_xy_m, parameters.simplify_z_m)

@@ -1,0 +1,271 @@
+"""Finished lines: united, without turns, thinned."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from rail_extract.core.lines.finishing import (
+    MAX_TURN_DEG,
+    essential_vertices,
+    parts_without_turns,
+    thin,
+    turn_deg,
+    united,
+)
+from rail_extract.core.lines.smoothing import smooth_network
+from rail_extract.core.parameters import Parameters
+from rail_extract.core.polyline import interpolate, length_along
+from rail_extract.core.progress import Progress
+from rail_extract.core.rails import RailLine, Support
+from rail_extract.core.raster import rasterize
+from rail_extract.core.squares.steps import _finished, lines_of
+from rail_extract.core.vectorize import vectorize
+from rail_extract.laboratory.rasters.drawing import Window, draw_label
+from rail_extract.laboratory.rasters.layouts import random_layout
+from rail_extract.laboratory.rasters.pairs import BASE_RATIO, CELL_M, SPACING_M
+from rail_extract.laboratory.rasters.paths import TrackSize
+
+
+def piece(start_m, end_m, points=100, resid_mm=1.0, gaps=()):
+    xyz = np.array([[x, 0.0, 0.1 * x] for x in np.linspace(start_m, end_m, 5)])
+    gaps = np.array(gaps, dtype=float).reshape(-1, 2)
+    return RailLine(xyz, 3, 10, points, resid_mm, 2.0, float(np.diff(gaps).sum()), gaps)
+
+
+def test_a_single_piece_keeps_its_line_and_has_whole_points():
+    part = piece(0, 10)
+    assert united([part]) is part
+    some = united([replace(part, points=99.6, sigma_mm=3.5)])
+    assert (some.points, some.sigma_mm) == (100, 3.5)
+    assert np.array_equal(some.xyz, part.xyz)
+
+
+def test_vertices_counts_and_gaps_of_two_pieces_are_those_of_the_whole():
+    whole = united([piece(0, 10, 100, 1.0, [(8.0, 10.0)]), piece(10, 30, 300, 2.0, [(0.0, 1.0), (5.0, 6.0)])])
+    assert np.array_equal(whole.xyz[:, 0], [0, 2.5, 5, 7.5, 10, 15, 20, 25, 30])
+    assert whole.points == 400
+    assert whole.resid_mm == pytest.approx(np.sqrt((1 * 100 + 4 * 300) / 400))
+    assert whole.gaps.tolist() == [[8.0, 11.0], [15.0, 16.0]]
+    assert whole.bridged_m == pytest.approx(4.0)
+    assert whole.sigma_mm == 2.0
+
+
+def supported(start_m, end_m, sigma_m, strips=None):
+    t = np.arange(0.5, end_m - start_m)
+    one = Support(t, np.full(len(t), 7), np.full(len(t), sigma_m), strips and np.full((len(t), 3), strips))
+    return replace(piece(start_m, end_m), support=replace(one, sigmaz_m=np.full(len(t), 2 * sigma_m)))
+
+
+def test_supports_follow_each_other_and_sigma_is_that_of_the_whole():
+    whole = united([supported(0, 10, 0.003), supported(10, 40, 0.005)])
+    np.testing.assert_allclose(whole.support.t, np.arange(0.5, 40))
+    np.testing.assert_allclose(whole.support.sigma_m, [0.003] * 10 + [0.005] * 30)
+    assert whole.support.points.sum() == 280 and whole.support.strips is None
+    assert whole.sigma_mm == pytest.approx(np.sqrt((9 + 3 * 25) / 4))
+    assert whole.sigmaz_mm == pytest.approx(2 * np.sqrt((9 + 3 * 25) / 4))
+    marked = united([supported(0, 10, 0.003, 2.0), supported(10, 40, 0.005)])
+    assert marked.support.strips[9].tolist() == [2.0] * 3 and marked.support.strips[10, 0] == 1.0
+    partly = united([supported(0, 10, 0.003), piece(10, 20)])
+    assert partly.support is None and partly.sigma_mm == 2.0
+    empty = Support(*np.empty((3, 0)))
+    assert united([replace(piece(0, 10), support=empty), replace(piece(10, 20), support=empty)]).sigma_mm == 2.0
+
+
+SIZE = TrackSize(SPACING_M, SPACING_M / (1 + BASE_RATIO))
+SIDE = 640
+
+
+def way(*corners, step_m=0.1):
+    """A line through corners with vertices every 0.1 m."""
+    corners = np.array(corners, dtype=float)
+    along = length_along(corners)
+    return interpolate(corners, along, np.arange(0, along[-1] + step_m / 2, step_m))
+
+
+def bend(radius_m, length_m=15.0):
+    t = np.arange(0, length_m, 0.1) / radius_m
+    return radius_m * np.column_stack([np.sin(t), 1 - np.cos(t)])
+
+
+@pytest.mark.parametrize("line", [way([0, 0], [30, 0]), way([0, 0], [0.4, 0]), bend(20.0), bend(-8.0)])
+def test_what_a_rail_can_do_stays(line):
+    assert parts_without_turns(line, 1.0, 0.8) == [(0.0, pytest.approx(length_along(line)[-1]))]
+
+
+def test_stairs_of_a_line_that_is_hardly_smoothed_are_no_turn():
+    x = np.arange(0, 20, 0.04)
+    stairs = np.column_stack([x, np.round(0.1 * x / 0.02) * 0.02])
+    assert len(parts_without_turns(stairs, 1.0, 0.1)) == 1
+    assert len(parts_without_turns(stairs, 1.0, 0.8)) != 1
+
+
+class Heard(Progress):
+    def __init__(self):
+        self.warnings = []
+
+    def warning(self, text):
+        self.warnings.append(text)
+
+
+@pytest.mark.parametrize("gaps", [[[3.0, 5.0], [28.0, 29.0]]])
+def test_rails_with_a_corner_are_split_and_said(gaps):
+    line = way([0, 0], [20, 0], [20, 10])
+    xyz = np.column_stack([line, np.zeros(len(line))])
+    t = np.arange(0.125, 30, 0.25)
+    support = Support(t, np.full(len(t), 10), np.where(t < 20, 0.001, 0.004))
+    rail = RailLine(xyz, 1, 10, 1200, 20.0, 2.0, 3.0, np.array(gaps), support)
+    heard = Heard()
+    one, other = _finished([rail], Parameters(1.435, 0.072), 5, heard)
+    assert (one.rail_id, other.rail_id) == (5, 6)
+    assert one.length_m + other.length_m == pytest.approx(28.9, abs=0.2)
+    assert (one.bridged_m, other.bridged_m) == (pytest.approx(2.0), pytest.approx(1.0))
+    assert (one.sigma_mm, other.sigma_mm) == (pytest.approx(1.0), pytest.approx(4.0))
+    assert one.points + other.points == pytest.approx(1200, rel=0.05)
+    (warning,) = heard.warnings
+    assert warning.startswith("1 rail bends by more than 10° within a metre")
+
+
+def damaged(layout, seed):
+    """Draw a layout with an open blade next to a rail, a slip between two rails, holes and blots."""
+    rng = np.random.default_rng(seed)
+    half = SIDE * CELL_M / 2
+    window, label = Window(SIDE, CELL_M, -half, half), np.zeros((SIDE, SIDE), dtype=bool)
+    heading = rng.uniform(0, 2 * np.pi)
+    turn = np.array([[np.cos(heading), np.sin(heading)], [-np.sin(heading), np.cos(heading)]])
+    for rail in layout.rails:
+        xy, normal = (rail.xy - layout.spots[0]) @ turn, rail.normal @ turn
+        draw_label(label, window, xy, normal, SIZE.head_width_m)
+        inside = np.flatnonzero((np.abs(xy) < half).all(axis=1))
+        if len(inside) > 1000 and rng.random() < 0.7:
+            first = rng.choice(inside[:-500])
+            t = 0.02 * np.arange(min(700, len(xy) - first))[:, None]
+            apart = rng.choice([0.06, 0.1, 0.14]) + t**2 / rng.choice([380.0, 600.0]) * rng.choice([0, 1])
+            part = slice(first, first + len(t))
+            draw_label(label, window, xy[part] + rng.choice([-1, 1]) * apart * normal[part], normal[part], 0.04)
+    rows, columns = np.nonzero(label)
+    for _ in range(len(rows) // 400):
+        row, column = rows[(number := rng.integers(len(rows)))], columns[number]
+        size = rng.integers(1, 12)
+        label[max(row - size, 0) : row + size, max(column - size, 0) : column + size] = rng.random() < 0.3
+    rows, columns = np.nonzero(label)
+    return np.column_stack([window.x0 + (columns + 0.5) * CELL_M, window.y0 - (rows + 0.5) * CELL_M])
+
+
+@settings(max_examples=12, derandomize=True)
+@given(st.integers(0, 2**31))
+def test_no_line_of_a_damaged_network_turns_as_no_rail_can(seed):
+    layout = random_layout(np.random.default_rng(seed), SIZE)
+    raster = rasterize(damaged(layout, seed), CELL_M)
+    rails = lines_of(raster, 10, None, Parameters(1.435, SIZE.head_width_m))
+    # The angle is measured from other stations here, and simplified lines have corners of a degree.
+    assert all(turn_deg(rail.xyz[:, :2]) <= MAX_TURN_DEG + 1.5 for rail in rails)
+
+
+@pytest.mark.parametrize("seed", [[77, 0]])
+def test_no_crossing_is_drawn_back_along_its_legs(seed):
+    """Without the last check: here a leg runs alongside the shared part, and the line turned by 180 degrees."""
+    rng = np.random.default_rng(seed)
+    layout = random_layout(rng, SIZE)
+    heading, half = rng.uniform(0, 6.28), 768 * CELL_M / 2
+    turn = np.array([[np.cos(heading), np.sin(heading)], [-np.sin(heading), np.cos(heading)]])
+    window, label = Window(768, CELL_M, -half, half), np.zeros((768, 768), dtype=bool)
+    for rail in layout.rails:
+        draw_label(label, window, (rail.xy - layout.spots[0]) @ turn, rail.normal @ turn, SIZE.head_width_m)
+    rows, columns = np.nonzero(label)
+    places = np.column_stack([window.x0 + (columns + 0.5) * CELL_M, window.y0 - (rows + 0.5) * CELL_M])
+    network = smooth_network(vectorize(rasterize(places, CELL_M), SIZE.head_width_m), 0.8)
+    assert max(turn_deg(line) for line in network.lines) < MAX_TURN_DEG
+
+
+def rail(xyz):
+    return RailLine(np.asarray(xyz), 1, 10, points=0, resid_mm=0.0, sigma_mm=0.0, bridged_m=0.0)
+
+
+def arc(radius, length, step=0.05):
+    angle = np.arange(0, length / radius, step / radius)
+    return radius * np.column_stack([np.sin(angle), 1 - np.cos(angle), 0 * angle])
+
+
+def test_lines_keep_the_vertices_in_which_others_end():
+    main = arc(300.0, 60.0)
+    branch = main[517] + np.column_stack([np.arange(20.0), 0.02 * np.arange(20.0) ** 2, np.zeros(20)])
+    alone = thin([rail(main)], 0.002, 0.002)[0].xyz
+    thinned, other = (line.xyz for line in thin([rail(main), rail(branch)], 0.002, 0.002))
+    assert not (alone == main[517]).all(axis=1).any()
+    assert (thinned == other[0]).all(axis=1).any()
+    assert len(thinned) <= len(alone) + 2
+
+
+def test_thinned_lines_are_short_and_near():
+    (line,) = thin([rail(arc(300.0, 60.0))], 0.002, 0.002)
+    assert len(line.xyz) < 40
+    middle = 0.5 * (line.xyz[1:] + line.xyz[:-1])
+    assert np.abs(np.hypot(middle[:, 0], middle[:, 1] - 300.0) - 300.0).max() <= 0.002
+    np.testing.assert_array_equal(line.xyz[[0, -1]], arc(300.0, 60.0)[[0, -1]])
+
+
+@pytest.mark.parametrize("radius", [25.0, 190.0, 1200.0])
+def test_thinned_curves_neither_shrink_nor_shift(radius):
+    """Chords between vertices of the curve would be inside it, by 1.3 mm on average."""
+    (line,) = thin([rail(arc(radius, 60.0, 0.01))], 0.002, 0.002)
+    at = np.linspace(0, len(line.xyz) - 1, 20_001)
+    x, y = (np.interp(at, np.arange(len(line.xyz)), column) for column in line.xyz.T[:2])
+    weight = np.hypot(np.gradient(x), np.gradient(y))
+    off = np.hypot(x, y - radius) - radius
+    assert abs(np.average(off, weights=weight)) < 0.0001
+    assert np.abs(off).max() < 0.002
+
+
+def test_dropped_vertices_are_within_the_tolerance():
+    random = np.random.default_rng(2)
+    along = np.arange(0, 60, 0.1)
+    rough = np.column_stack([along, np.cumsum(random.normal(0, 0.001, (600, 2)), axis=0)])
+    (line,) = thin([rail(rough)], 0.002, 0.003)
+    assert len(line.xyz) < 300
+    assert np.abs(np.interp(along, line.xyz[:, 0], line.xyz[:, 1]) - rough[:, 1]).max() < 0.002 + 1e-5
+    assert np.abs(np.interp(along, line.xyz[:, 0], line.xyz[:, 2]) - rough[:, 2]).max() < 0.003 + 1e-5
+
+
+@given(st.integers(0, 10**6), st.floats(1e-3, 0.3), st.floats(1e-3, 0.3))
+@settings(max_examples=25, deadline=None)
+def test_simplified_lines_keep_both_tolerances(seed, tolerance_xy, tolerance_z):
+    random = np.random.default_rng(seed)
+    line = np.cumsum(random.normal(size=(60, 3)) * 0.3 + [0.5, 0, 0], axis=0)
+    kept = np.flatnonzero(essential_vertices(line, tolerance_xy, tolerance_z)).tolist()
+    assert kept[0] == 0
+    assert kept[-1] == 59
+    for first, last in zip(kept[:-1], kept[1:]):
+        chord = line[last] - line[first]
+        for vertex in line[first : last + 1]:
+            share = np.clip((vertex - line[first])[:2] @ chord[:2] / (chord[:2] @ chord[:2]), 0, 1)
+            off = vertex - line[first] - share * chord
+            assert np.hypot(*off[:2]) <= tolerance_xy + 1e-12
+            assert abs(off[2]) <= tolerance_z + 1e-12
+
+
+def test_height_counts_on_its_own_and_plan_without_height():
+    hump = np.column_stack([np.arange(5.0), np.zeros(5), [0, 0, 0.01, 0, 0]])
+    assert essential_vertices(hump, 0.002, 0.002).sum() > 2
+    assert essential_vertices(hump, 0.002, 0.02).sum() == 2
+    hump[:, 2] = np.nan
+    assert essential_vertices(hump, 0.002, 0.002).sum() == 2
+    hump[2, 1] = 0.01
+    assert essential_vertices(hump, 0.002, 0.002).sum() == 5
+
+
+def test_thinning_keeps_a_closed_line_closed():
+    angle = np.linspace(0, 2 * np.pi, 5001)
+    loop = 25 * np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
+    kept = essential_vertices(loop, 0.002, 0.002)
+    assert kept[0]
+    assert kept[-1]
+    fewest = 2 * np.pi * 25 / np.sqrt(8 * 25 * 0.002)
+    assert fewest <= kept.sum() <= 2.1 * fewest
+
+
+def test_a_tolerance_of_zero_drops_only_vertices_on_the_line():
+    assert essential_vertices(arc(25, 90.0, step=3.0), 0.0, 0.0).all()
+    straight = np.column_stack([np.arange(9.0), np.zeros(9), np.zeros(9)])
+    assert essential_vertices(straight, 0.0, 0.0).sum() == 2
