@@ -12,12 +12,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from rail_extract.core.grow.growth import Growth, Rail, grow, on_rails
-from rail_extract.core.grow.points import Buckets
+from rail_extract.core.grow.growth import Growth, Rail, grow
 from rail_extract.core.grow.settings import GrowSettings
 from rail_extract.core.polyline import interpolate, length_along, project
 from rail_extract.laboratory.ruler.classification import truth
 from rail_extract.laboratory.ruler.lines import cut, nearest
+from rail_extract.laboratory.ruler.whole_clouds import GrowingCloud
 from rail_extract.laboratory.scenes.raw import RawScene
 from rail_extract.laboratory.scenes.raw_catalogue import AIR, RAW_SCENES
 from scipy.spatial import cKDTree
@@ -76,7 +76,7 @@ def main() -> None:
 
 def measured(scene: RawScene, wide: bool) -> Row:
     """Click each rail of a scene in its middle."""
-    row, points = Row(), Buckets(scene.xyz)
+    row, points = Row(), GrowingCloud(scene.xyz, settings_of(scene))
     for rail, growth, seconds in clicked(scene, points):
         row.rails += 1
         row.seconds += seconds
@@ -84,7 +84,7 @@ def measured(scene: RawScene, wide: bool) -> Row:
         if growth is None:
             continue
         row.found += 1
-        on = on_rails(growth.rails, scene.xyz, settings_of(scene))
+        on = points.on(growth.rails)
         head, beside = truth(scene, on, wide)
         along = _beside(growth.rails, scene)
         along &= scene.head
@@ -110,13 +110,13 @@ def settings_of(scene: RawScene) -> GrowSettings:
     return GrowSettings(scene.standard.gauge_m, scene.standard.head_width_m)
 
 
-def clicked(scene: RawScene, points: Buckets) -> Iterator[tuple[np.ndarray, Growth | None, float]]:
+def clicked(scene: RawScene, points: GrowingCloud) -> Iterator[tuple[np.ndarray, Growth | None, float]]:
     """Yield each rail, what grows from a click on it, and the processor time."""
     rng = np.random.RandomState(0)
     for rail in scene.rails:
         middle = _seen_middle(rail, scene)
         start = time.process_time()
-        growth = grow(points, middle + rng.uniform(-CLICK_M, CLICK_M, 2), settings_of(scene))
+        growth = grow(points.heads, middle + rng.uniform(-CLICK_M, CLICK_M, 2), settings_of(scene))
         yield rail, growth, time.process_time() - start
 
 

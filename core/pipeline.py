@@ -33,8 +33,9 @@ from .squares.grid import Key, MemorySource, PointSource, Square, around, assemb
 from .squares.pieces import SquareRails, rows_in_frame
 from .squares.remeasuring import measure_rails
 from .squares.spool import SpooledFile, SpooledPoints, gather, spool_file
-from .squares.steps import clean_square, engine_for, rails_of_square, square_side, tracks_of, whole_rails
+from .squares.steps import clean_square, engine_for, rails_of_square, square_side, whole_rails
 from .tasks import Context, InTurn, Runner, Task
+from .tracks.centerlines import tracks_of
 from .tracks.geometry import measure_track_geometry
 from .tracks.parallels import widths_by_gauge
 

@@ -11,8 +11,9 @@ from rail_extract.core.frpdf.cleanup import clean
 from rail_extract.core.parameters import Parameters
 from rail_extract.core.rails import Centerline, RailLine
 from rail_extract.core.raster import RailRaster, cell_size, rasterize
-from rail_extract.core.squares.steps import engine_for, lines_of, tracks_of
+from rail_extract.core.squares.steps import engine_for, lines_of
 from rail_extract.core.standards import STANDARDS
+from rail_extract.core.tracks.centerlines import tracks_of
 from rail_extract.laboratory.curves import Curve, Element, trace
 from rail_extract.laboratory.scenes.plain import spacing
 from rail_extract.laboratory.scenes.scanner import Scanner

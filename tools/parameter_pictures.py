@@ -20,8 +20,8 @@ from parameter_bench import HEADING, STANDARD, Bench, bench, bend  # noqa: E402
 from pictures import draw_pictures  # noqa: E402
 from rail_extract.core.parameters import Parameters
 from rail_extract.core.rails import Centerline, RailLine  # noqa: E402
-from rail_extract.core.squares.steps import tracks_of  # noqa: E402
 from rail_extract.core.standards import STANDARDS  # noqa: E402
+from rail_extract.core.tracks.centerlines import tracks_of  # noqa: E402
 from rail_extract.laboratory.curves import Element, trace  # noqa: E402
 from rail_extract.laboratory.ruler.lines import match  # noqa: E402
 from rail_extract.laboratory.scenes.plain import spacing  # noqa: E402

@@ -18,7 +18,7 @@ from ..parameters import Parameters
 from ..polyline import interpolate, is_closed, length_along, resample, unit_tangents
 from ..progress import SILENT, Progress
 from ..rails import Centerline, RailLine
-from ..squares.steps import tracks_of_class
+from ..tracks.centerlines import tracks_of_class
 
 NO_LINE = (
     "The points found in the raw cloud give no rail: they are too few, or not on rails. Check the rail standard, the "

@@ -13,7 +13,7 @@ from ..classify.settings import Settings
 from ..classify.square import classify_square
 from ..clouds.points import Request
 from ..errors import CloudError, ParameterError
-from ..heads.blunt import blunt_share
+from ..heads.edgeless import blunt_share
 from ..heads.roads import MIN_WIDER_M
 from ..heads.sections import likelier_width
 from ..parameters import Parameters

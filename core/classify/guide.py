@@ -80,6 +80,11 @@ class Guide:
         reach_m = self.distance_m + CONTEXT_M
         return np.isfinite(self._tree.query(xy, distance_upper_bound=reach_m)[0])
 
+    def reaches(self, low: np.ndarray, high: np.ndarray) -> bool:
+        """Return whether places in a box, (2,) metres each, may have to be searched."""
+        reach_m = self.distance_m + CONTEXT_M
+        return bool(((self.xy >= low - reach_m) & (self.xy <= high + reach_m)).all(axis=1).any())
+
     def crosses(self, lines: Lines) -> tuple[np.ndarray, np.ndarray]:
         """Return which cells of rails run along the guide, and which run across it, (n,) bool each."""
         distance, place = self._tree.query(lines.axis, distance_upper_bound=self.distance_m)

@@ -128,6 +128,8 @@ class Settings:
         Where to search; in metres from the zero of the coordinate system, or from the corner of the square.
     weights : Path, optional
         Weights of a network that was trained on labelled clouds and replaces the geometry; see `learned`.
+    low_m : float
+        Least height of a rail above the bed, unless it is in a pavement or blunt.
     """
 
     gauges_m: tuple[float, ...]
@@ -135,6 +137,7 @@ class Settings:
     keep_single: bool = True
     guide: Guide | None = None
     weights: Path | None = None
+    low_m: float = LOW_M
 
     @property
     def cell_m(self) -> float:

@@ -216,7 +216,7 @@ class Standing:
 
 def _standing(shown: Shown, settings: Settings) -> Standing:
     """Find rails that stand out of their bed."""
-    found = Candidates.find(shown, HEADS)
+    found = Candidates.find(shown, replace(HEADS, low_m=settings.low_m))
     density = _density(shown.bed.coarse, shown.tops.grid.middles(found.marks))
     tolerances = THIN if density < THIN_PER_M2 else DENSE
     reach_m = reach_at(density)

@@ -18,9 +18,9 @@ from ..alignment.stations import Axes, AxisLine, Post, Start, make_axes
 from ..clouds.crs import is_geographic, parse_crs, units
 from ..disk import Destination
 from ..errors import CrsError, MissingError, ParameterError
-from ..fields import EXTENT_FIELDS, STATION_FIELDS, UNKNOWN_IN_METRES, Field
+from ..fields import EXTENT_FIELDS, STATION_FIELDS, Field
 from ..output.geopackage import geometries_in
-from ..output.writing import as_os_error, column_of
+from ..output.writing import column_of, write_table
 from ..progress import Progress
 from ..rails import Kilometres
 from .vectors import LAYER, Features, read_features
@@ -154,19 +154,13 @@ def write_copy(
     columns : sequence of sequence
         Values of each further field, one per feature.
     """
-    further = [column_of(field, [field.value(value) for value in values]) for field, values in zip(fields, columns)]
-    kept = {name: values for name, values in source.columns.items() if name not in {field.name for field in fields}}
+    own = {field.name for field in fields}
+    written: dict[str, tuple[np.ndarray, np.ndarray | None]] = {
+        name: (values, None) for name, values in source.columns.items() if name not in own
+    }
+    for field, values in zip(fields, columns):
+        written[field.name] = column_of(field, [field.value(value) for value in values])
     kinds = {shape.geom_type for shape in source.shapes if shape is not None}
-    with destination.replacing() as new, as_os_error():
-        pyogrio.raw.write(
-            str(new),
-            layer="stations",
-            driver="GPKG",
-            geometry=np.array([shapely.to_wkb(shape, output_dimension=4) for shape in source.shapes], dtype=object),
-            geometry_type=kinds.pop() if len(kinds) == 1 else "Unknown",
-            field_data=[*kept.values(), *(column for column, _ in further)],
-            field_mask=[*(None for _ in kept), *(empty for _, empty in further)],
-            fields=[*kept, *(field.name for field in fields)],
-            crs=source.crs_wkt or UNKNOWN_IN_METRES,
-            nan_as_null=True,
-        )
+    shapes = np.array([shapely.to_wkb(shape, output_dimension=4) for shape in source.shapes], dtype=object)
+    with destination.replacing() as new:
+        write_table(new, "stations", shapes, kinds.pop() if len(kinds) == 1 else "Unknown", written, source.crs_wkt)

@@ -6,7 +6,8 @@ See docs/comparison.md.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 
@@ -145,6 +146,14 @@ class LineDifferences:
     shift_mm: np.ndarray
     shiftz_mm: np.ndarray
     moved: np.ndarray
+
+    @classmethod
+    def at(cls, stations: tuple[np.ndarray, np.ndarray, np.ndarray], **known: Any) -> LineDifferences:
+        """Return what is known at stations, given as chainages, places and vectors to the left; the rest is NaN."""
+        t, places, left = stations
+        unknown = {one.name: np.full(len(t), np.nan) for one in fields(cls) if one.name.endswith("_mm")}
+        moved = np.zeros(len(t), dtype=bool)
+        return cls(xyz=places, left=left, chainage_m=t, moved=moved, **{**unknown, **known})
 
     @property
     def cells_m(self) -> np.ndarray:
@@ -295,23 +304,17 @@ def _compare(
     ids, errors_m = np.full(len(t), None, dtype=object), np.full((len(t), 2), np.nan)
     for one in set(found[found >= 0].tolist()):
         ids[found == one], errors_m[found == one] = other.lines[one].number, other.errors_of(other.lines[one])
-    unknown = np.full(len(t), np.nan)
-    return LineDifferences(
+    return LineDifferences.at(
+        (t, places, left),
         line_id=line.number,
         state=np.where(found < 0, MISSING, BOTH).astype(object),
         input_id=ids,
-        xyz=places,
-        left=left,
-        chainage_m=t,
         across_mm=1000 * np.sum(step[:, :2] * left, axis=1),
         height_mm=1000 * step[:, 2],
         gauge_mm=1000 * gauge_m,
         cant_mm=1000 * cant_m,
         sigma_mm=1000 * errors_m[:, 0],
         sigmaz_mm=1000 * errors_m[:, 1],
-        shift_mm=unknown,
-        shiftz_mm=unknown,
-        moved=np.zeros(len(t), dtype=bool),
     )
 
 
@@ -362,17 +365,11 @@ def _extra(
     found = np.concatenate([_paired(places[p], left[p], number, turned, settings.reach_m)[1] for p in parts])
     if (found >= 0).all():
         return None
-    unknown, alone = np.full(len(t), np.nan), found < 0
-    values = dict.fromkeys(("across", "height", "gauge", "cant", "sigma", "sigmaz", "shift", "shiftz"), unknown)
-    return LineDifferences(
+    return LineDifferences.at(
+        (t, places, left),
         line_id=line.number,
-        state=np.where(alone, EXTRA, "").astype(object),
+        state=np.where(found < 0, EXTRA, "").astype(object),
         input_id=np.full(len(t), line.number, dtype=object),
-        xyz=places,
-        left=left,
-        chainage_m=t,
-        moved=np.zeros(len(t), dtype=bool),
-        **{f"{name}_mm": value for name, value in values.items()},
     )
 
 

@@ -1,4 +1,4 @@
-"""What the growth is given: the track, the user's tolerances, and those that depend on how dense a cloud is."""
+"""What the growth is given: the track, the user's tolerances, and those that depend on the cloud."""
 
 from __future__ import annotations
 
@@ -7,10 +7,6 @@ from dataclasses import dataclass, replace
 from ..classify import settings as classify
 from ..parameters import GrowParameters
 
-HEAD_LEVEL_M = 0.20
-"""Difference in height between windows on heads that the classification has found: it only has to tell the rail from
-one on a bridge. Measured on blunt heads: up to 0.15 m off their course."""
-
 
 @dataclass(frozen=True)
 class Beam:
@@ -18,75 +14,61 @@ class Beam:
 
     Attributes
     ----------
-    blur_m : float
-        Width beside a head that mixed pixels fill.
-    fringe_m : float
-        Width beyond it that must be empty at the height of the top: less than the narrowest flangeway, 35 mm.
-    clear : float
-        Largest density of points there, as a share of that on the head.
-    level_m : float
-        Added to the user's tolerance in height for the points that are compared; noise.
+    gap_m : float
+        Distance across between points of two heads; those of one are closer. A flangeway is 35 mm wide and more.
+    beside_m : float
+        Distance beyond the side of a head up to which the classification labels its points.
     below_m, above_m : float
         Heights of rail points relative to the top.
     widen_m : float
-        Added to either side of the user's envelope; the beam is as wide.
+        Added to either side of the user's strip; the beam is as wide.
+    level_m : float
+        Added to the user's tolerance in height between windows.
     sigma_m : float
         Accuracy across of a window.
-    fit_m : float
-        Length over which a course is fitted.
-    steady_m : float
-        Largest distance of the windows of a rail from their course, root mean square. Measured: up to 8 mm on dense
-        rails and 15 mm on thin ones; undergrowth and rubble 12 to 63 mm.
-    classified : bool
-        Whether heads are looked for where the classification finds some; see `on_heads`.
+    fit_m, smooth_m : float
+        Length over which a course is fitted, and half the length over which the axis is smoothed.
     """
 
-    blur_m: float
-    fringe_m: float
-    clear: float
-    level_m: float
+    gap_m: float
+    beside_m: float
     below_m: float
     above_m: float
     widen_m: float
+    level_m: float
     sigma_m: float
     fit_m: float
-    steady_m: float
-    classified: bool = False
-
-    def on_heads(self) -> Beam:
-        """Return the tolerances for points that the classification has found on heads."""
-        return replace(self, level_m=HEAD_LEVEL_M, classified=True)
+    smooth_m: float
 
 
 DENSE = Beam(
-    blur_m=0.004,
-    fringe_m=0.030,
-    clear=0.35,
-    level_m=0.0,
+    gap_m=0.025,
+    beside_m=0.008,
     below_m=0.040,
     above_m=0.025,
     widen_m=0.0,
+    level_m=0.0,
     sigma_m=0.005,
     fit_m=5.0,
-    steady_m=0.010,
+    smooth_m=1.5,
 )
 """For scanners on vehicles: beams of a few millimetres, range noise up to 5 mm."""
 
 THIN = Beam(
-    blur_m=0.025,
-    fringe_m=0.060,
-    clear=0.5,
-    level_m=0.015,
+    gap_m=0.10,
+    beside_m=0.06,
     below_m=0.055,
     above_m=0.040,
     widen_m=0.02,
+    level_m=0.20,
     sigma_m=0.020,
     fit_m=10.0,
-    steady_m=0.020,
+    smooth_m=3.0,
 )
-"""For scanners in the air: a beam of 4 to 9 cm blends the head and the ballast."""
+"""For scanners in the air: a beam of 4 to 9 cm blends the head and the ballast. Height only has to tell a rail from one
+on a bridge: measured on blunt heads, tops are up to 0.15 m off their course."""
 
-BLUNT = replace(THIN, below_m=classify.BLUNT.below_m, above_m=classify.BLUNT.above_m, steady_m=0.035)
+BLUNT = replace(THIN, below_m=classify.BLUNT.below_m, above_m=classify.BLUNT.above_m)
 """For clouds that blur a head to a round ridge."""
 
 
@@ -108,3 +90,8 @@ class GrowSettings:
     def spacing_m(self) -> float:
         """Distance of the two heads of a track."""
         return self.gauge_m + self.head_width_m
+
+    @property
+    def classification(self) -> classify.Settings:
+        """Settings of the classification whose points are followed."""
+        return classify.Settings((self.gauge_m,), self.head_width_m, low_m=self.parameters.min_height_m)

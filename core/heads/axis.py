@@ -13,9 +13,8 @@ from scipy.ndimage import maximum_filter1d
 
 from ..polyline import interpolate, left_normals
 from ..rails import Support
-from .blunt import WINDOW, Ridge, wander
+from .edgeless import FLANK_TOP_SIGMA_M, WINDOW, Flank, Ridge, find_flank, wander
 from .edges import EDGE_SIGMA_M, VIEW_STATIONS, edge_middles
-from .flank import FLANK_TOP_SIGMA_M, Flank, find_flank
 from .head_points import MIN_ON_HEAD, STATION_STEP_M, HeadPoints
 from .level import robust_sigma
 from .roads import MIN_WIDER_M, bands, hidden_edges

@@ -31,9 +31,6 @@ MAX_BACK_M = 25.0
 HEEL_SPREAD_M = 0.15
 """Distance between the axes up to which a blade is straight: at the heels of American switches it is 6 1/4 inches."""
 
-SWITCH_M = 2.5
-"""Nodes this close belong to the two blades of one switch: the widest gauge, and blades that begin a metre apart."""
-
 EMPTY_SHARE = 0.4
 """Between the edges of a straight blade and of an arc, point density relative to that on the adjacent head below which
 there is no head. Noise of a centimetre fills a quarter, and leaves three quarters of a head that is there."""
@@ -72,10 +69,8 @@ def slide_branches(network: LineNetwork, xyz: np.ndarray, head_width_m: float, s
     apart_m = APART_HEADS * head_width_m, between_m[1]
     partings = [_parting(network, end, number, apart_m) for number, end in starts]
     counts = [np.zeros(2) if one is None else _points_of_arc(network, one, xyz, head_width_m) for one in partings]
-    places = [network.nodes[network.passes[number, 0]] for number, _ in starts]
-    for (number, end), place in zip(starts, places):
-        of_switch = [count for count, other in zip(counts, places) if np.hypot(*(other - place)) < SWITCH_M]
-        network = _slide(network, end, number, between_m, _power(np.sum(of_switch, axis=0)))
+    for (number, end), count in zip(starts, counts):
+        network = _slide(network, end, number, between_m, _power(count))
     return network.tidy()
 
 

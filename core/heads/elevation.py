@@ -19,7 +19,7 @@ from ..polyline import interpolate, length_along, resample, starts_at_its_end
 from ..progress import SILENT, Progress
 from ..rails import RailLine, Support
 from .axis import CELL_M, Axis, unseen_m
-from .blunt import SMOOTHING_M, wander
+from .edgeless import SMOOTHING_M, wander
 from .head_points import HeadPoints, Widths, near_lines, stations_along
 from .level import rough_level
 from .own_level import on_own_level

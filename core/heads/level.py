@@ -15,10 +15,6 @@ LEVEL_BIN_M = 0.5
 MEDIAN_BINS = 5
 """Bins in the running median: weeds up to 1 m long cannot lift the level."""
 
-OTHER_RAIL_M, OTHER_RAIL_BINS = 1.0, 41
-"""Bins that differ by more than this from the median of this number of bins, 20 m of rail, belong to a rail on a bridge
-above or below: no rail rises so steeply, and the part that a bridge hides is shorter."""
-
 SLOPE_BINS = 9
 """Bins that share one slope across: over 4.5 m cant changes by at most 1 % of its slope."""
 
@@ -63,7 +59,7 @@ def rough_level(t: np.ndarray, z: np.ndarray) -> np.ndarray:
     middle_t = t[first + count // 2]
     level = medians(z, first, count)
     trend = Polynomial.fit(middle_t, level, 1) if len(middle_t) > MEDIAN_BINS else Polynomial([0.0])
-    return trend(t) + np.interp(t, middle_t, _median_filtered(middle_t, level - trend(middle_t)))
+    return trend(t) + np.interp(t, middle_t, median_filter(level - trend(middle_t), MEDIAN_BINS, mode="nearest"))
 
 
 def medians(values: np.ndarray, first: np.ndarray, count: np.ndarray) -> np.ndarray:
@@ -85,14 +81,6 @@ def medians(values: np.ndarray, first: np.ndarray, count: np.ndarray) -> np.ndar
         filled[own] = values[(first[groups, None] + np.arange(filled.shape[1]))[own]]
         found[groups] = np.sort(filled, axis=1)[np.arange(len(groups)), count[groups] // 2]
     return found
-
-
-def _median_filtered(t: np.ndarray, level: np.ndarray) -> np.ndarray:
-    """Apply a running median to heights without their trend, and leave out those of another rail."""
-    own = np.abs(level - median_filter(level, OTHER_RAIL_BINS, mode="nearest")) <= OTHER_RAIL_M
-    if own.any():
-        level = np.interp(t, t[own], level[own])
-    return median_filter(level, MEDIAN_BINS, mode="nearest")
 
 
 def robust_sigma(values: np.ndarray) -> float:

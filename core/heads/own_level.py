@@ -39,18 +39,13 @@ SAGITTA = 5e-5
 """Sagitta of a rail's profile, metres, per product of the distances from both ends, m²: half the curvature of waves of
 10 mm that are 60 m long."""
 
-SKIPPED_BINS = 3
-"""Bins without a level that a level runs across."""
-
-SHARED_BINS = 8
-"""Bins in which two pieces of one level may overlap: where points are few, one bin that is off begins another piece."""
-
 SLOPE_BINS = 41
 """Bins, 20 m, whose median change of level is the gradient."""
 
 MIN_BINS = 4
 """Bins, 2 m, of a level that counts, because what stands out by chance is shorter, and of its end that is compared with
-the next bin."""
+the next bin; a level runs across fewer bins that lack it. Two pieces of one level may overlap by twice as many: where
+points are few, one bin that is off begins another piece."""
 
 DRIFT = 0.004
 """Error of the gradient, by which the levels on both sides of a gap may differ per metre, and at most `MAX_DRIFT_M`."""
@@ -170,7 +165,7 @@ def _pieces(levels: _Levels, step_m: float) -> list[np.ndarray]:
     pieces: list[tuple[list[int], list[float]]] = []
     ends: dict[int, tuple[int, float]] = {}
     for here, up in zip(levels.bin.tolist(), levels.height.tolist()):
-        ends = {one: end for one, end in ends.items() if here - end[0] <= SKIPPED_BINS}
+        ends = {one: end for one, end in ends.items() if here - end[0] < MIN_BINS}
         steps = [(abs(height - up), one) for one, (end, height) in ends.items() if end < here]
         step, nearest = min(steps, default=(np.inf, -1))
         if step > step_m:
@@ -206,7 +201,7 @@ def _chain(pieces: list[np.ndarray], step_m: float) -> np.ndarray:
         off_m = np.abs(first[number] - last[:number])
         fits = off_m <= step_m + np.clip(DRIFT * gap_m, 0.0, MAX_DRIFT_M)
         cost = np.where(fits, 0.0, np.where(off_m <= SHIFTED_M, SHIFT_BINS, np.inf))
-        along = (gap_m > 0) | (fits & (gap_m > -SHARED_BINS * LEVEL_BIN_M))
+        along = (gap_m > 0) | (fits & (gap_m > -2 * MIN_BINS * LEVEL_BIN_M))
         sums = np.where(along, best[:number] - cost, 0.0)
         if sums.max() > 0:
             before[number] = int(np.argmax(sums))

@@ -14,16 +14,13 @@ from ..clouds.points import RailPoints
 from ..lines.network import LineNetwork
 from ..lines.smoothing import bend_through
 from ..parameters import Parameters
-from ..polyline import left_normals, length_along, project
+from ..polyline import left_normals, length_along
 from ..progress import SILENT, Progress
 from .axis import CELL_M, Axis, unseen_m
 from .branch_starts import slide_branches
 from .head_points import Widths, near_lines, widest
 from .own_level import on_own_level
 from .strips import measure_strips
-
-MAX_CROSSING_SHIFT_M = 3.0
-"""Limit for how far a crossing moves when two lines move by half a head: at 1:26.5 each moves it by 1 m."""
 
 ROUNDS, SURE_HEADS = 3, 0.7
 """Rounds of moving lines, and distance of a branch from its stock rail, in head widths, from which most of its head is
@@ -99,7 +96,7 @@ def _shifted(
 
 def _joined(network: LineNetwork, lines: list[np.ndarray], smoothing_m: float) -> LineNetwork:
     """Make lines that were moved one by one meet again: where lines run through the node, else at the mean of ends."""
-    passes = _crossings(network.passes, lines)
+    passes = network.passes
     places, votes = np.zeros_like(network.nodes), np.zeros(len(network.nodes))
     through = np.isin(np.arange(len(votes)), passes[:, 0])
     ending = [(node, number, -side) for number, ends in enumerate(network.ends) for side, node in enumerate(ends)]
@@ -114,22 +111,4 @@ def _joined(network: LineNetwork, lines: list[np.ndarray], smoothing_m: float) -
     for line, own in zip(lines, anchors):
         own_nodes, vertices = np.array(own).T
         bend_through(line, length_along(line) / smoothing_m, vertices, nodes[own_nodes])
-    return replace(network, lines=tuple(lines), nodes=nodes, passes=passes)
-
-
-def _crossings(passes: np.ndarray, lines: list[np.ndarray]) -> np.ndarray:
-    """Find the vertices at which lines that run through the same node cross after they were moved."""
-    passes = passes.copy()
-    for node in np.unique(passes[:, 0]):
-        one, *others = np.flatnonzero(passes[:, 0] == node)
-        for other in others:
-            (_, a, vertex), b = passes[one], passes[other, 1]
-            along = length_along(lines[a])
-            nearby = np.arange(1, len(lines[a]) - 1)
-            nearby = nearby[np.abs(along[nearby] - along[vertex]) < MAX_CROSSING_SHIFT_M]
-            feet = project([lines[b]], lines[a][nearby], MAX_CROSSING_SHIFT_M)
-            if a != b and len(feet.t):
-                best = np.argmin(np.abs(feet.across))
-                passes[one, 2] = nearby[feet.point[best]]
-                passes[other, 2] = np.argmin(np.abs(length_along(lines[b])[1:-1] - feet.t[best])) + 1
-    return passes
+    return replace(network, lines=tuple(lines), nodes=nodes)

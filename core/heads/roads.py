@@ -33,9 +33,6 @@ MAX_MISS_M, CLEARLY_M = 0.015, 0.012
 AT_EDGE_M = 0.012
 """Largest distance of the end of a band from the edge of the head: lines are within 1 cm of the axis."""
 
-MIN_ABREAST = 0.5
-"""Share of the places that have to be abreast of a line."""
-
 PLACE_M = 1.0
 """Spacing of the places at which the distance of two rails is measured."""
 
@@ -142,6 +139,6 @@ def _miss(places: np.ndarray, others: Sequence[np.ndarray], spacings_m: Sequence
     found = [np.inf]
     for other in others:
         away_m = np.abs(project([other], places, max(spacings_m) + MAX_MISS_M).across)
-        if len(away_m) > MIN_ABREAST * len(places):
+        if len(away_m):
             found.append(min(abs(float(np.median(away_m)) - spacing_m) for spacing_m in spacings_m))
     return min(found)

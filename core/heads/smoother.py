@@ -13,10 +13,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 from scipy.interpolate import CubicSpline
-from scipy.linalg import LinAlgError, cho_solve_banded
-from scipy.linalg.lapack import dpbsv
+from scipy.linalg import cho_solve_banded, cholesky_banded
 
 from ..polyline import interpolate, left_normals, length_along
 
@@ -238,8 +236,8 @@ class _Priors:
     def off(self, found: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the differences of design, (s, p), and waves in their scales, given coefficients, (s, 2 n)."""
         design, waves = self.scales
-        bends = _differences(found[:, ::2], DESIGN) + self.bends
-        return bends / design, _differences(found[:, 1::2], WAVES) / waves
+        bends = np.diff(found[:, ::2], 3) + self.bends
+        return bends / design, np.diff(found[:, 1::2], 2) / waves
 
     def information(self, weights: tuple[np.ndarray, np.ndarray], count: int) -> np.ndarray:
         """Return the information, (8, s, 2 count), given the weights of the differences."""
@@ -284,21 +282,15 @@ def _fits(data: np.ndarray, score: np.ndarray, priors: _Priors) -> tuple[np.ndar
             right[:, ::2][:, one : one + len(priors.bends)] -= factor * bends
         band = both + priors.information(weights, count)
         band[0] += ROUNDING * band[0].max(axis=1, keepdims=True)
-        factors, found = _solved(band, right)
+        factors = cholesky_banded(band.reshape(len(band), -1), lower=True, check_finite=False)  # they are one matrix
+        found = cho_solve_banded((factors, True), right.ravel(), check_finite=False).reshape(right.shape)
         design, waves = priors.off(found)
         weights = (FREEDOM + 1) / (FREEDOM + design**2), (FREEDOM + 1) / (FREEDOM + waves**2)
     coefficients = found[:, ::2] + found[:, 1::2]
     explained = coefficients @ score - 0.5 * (coefficients * _times(data, coefficients)).sum(axis=1)
+    factors = factors.reshape(band.shape)
     evidence = explained + priors.log_probability(found) - np.log(factors[0]).sum(axis=1)
     return coefficients, factors, evidence
-
-
-def _solved(band: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the Cholesky factors of banded matrices, (8, s, n), and the solutions, (s, n): they are one matrix."""
-    factors, found, failed = dpbsv(band.reshape(len(band), -1), right.ravel(), lower=1)
-    if failed:
-        raise LinAlgError("The information about a course is not positive definite.")
-    return factors.reshape(band.shape), found.reshape(right.shape)
 
 
 def _of_both(data: np.ndarray) -> np.ndarray:
@@ -309,11 +301,6 @@ def _of_both(data: np.ndarray) -> np.ndarray:
         if apart:
             both[2 * apart - 1, 1::2] = data[apart]
     return both
-
-
-def _differences(coefficients: np.ndarray, difference: np.ndarray) -> np.ndarray:
-    """Return the differences of neighbouring coefficients, (s, n - k + 1), given (s, n) and the difference, (k,)."""
-    return sliding_window_view(coefficients, len(difference), axis=-1) @ difference
 
 
 def _times(band: np.ndarray, vectors: np.ndarray) -> np.ndarray:

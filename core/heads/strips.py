@@ -318,15 +318,6 @@ def rows_of(lines: Sequence[np.ndarray], offsets: Sequence[StripOffsets | None])
         places, normals = interpolate(line, along, own.t), interpolate(left_normals(line), along, own.t)
         strip, station = np.nonzero(own.shown & (own.count >= 2))
         shift = own.across[strip, station, None] * normals[station]
-        rows.append(
-            np.column_stack(
-                [
-                    places[station],
-                    own.strips[strip],
-                    shift,
-                    own.up[strip, station],
-                    own.points[strip, station],
-                ]
-            )
-        )
+        columns = places[station], own.strips[strip], shift, own.up[strip, station], own.points[strip, station]
+        rows.append(np.column_stack(columns))
     return np.concatenate(rows)

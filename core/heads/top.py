@@ -9,10 +9,10 @@ from dataclasses import dataclass, replace
 from typing import Union
 
 import numpy as np
+from scipy.ndimage import grey_closing
 
 from ..lines.smoothing import VARIANCE_FACTOR, smooth_profile
 from ..rails import Support
-from .envelope import extremal_boundary
 from .head_points import RIM_HEADS, HeadPoints
 from .level import AXIS_SHARE, OFF_TOP_SIGMAS, SLOPE_ROUNDS, cross_slope, robust_sigma, rough_level
 from .outline import CROWN_RADIUS_M
@@ -22,22 +22,12 @@ from .smoother import Spline, bridge_error, smooth
 MIN_POINTS = 10
 """A line with fewer points is not a rail: 1 m of the sparsest rail has more."""
 
-MAX_ABOVE_M = 0.03
-"""Height above the rough level beyond which points, such as weeds, are kept from lifting the disc; the slope of a head
-accounts for at most 5 mm."""
-
-MIN_BAND_M = 0.01
-"""Minimum of the depth below the disc and of the half height of the band: the disc sags 6 mm into a gap of 1 m."""
-
-DISC_DEPTH_SIGMAS = 6.0
-"""Depth below the disc in standard deviations of the noise: the disc is about three above the top, and points scatter
-as far below it."""
+MIN_BAND_M, BAND_SIGMAS = 0.01, 3.0
+"""Half height of the band around the top: its minimum, because the disc sags 6 mm into a gap of 1 m, and in standard
+deviations of the noise."""
 
 DISC_BIN_M = 0.02
 """Of points this close together only the highest is given to the disc, which is 1 mm too low then on a slope of 5 %."""
-
-BAND_SIGMAS = 3.0
-"""Half height of the band around the top, in standard deviations of the noise."""
 
 BAND_ROUNDS = 3
 """Rounds of smoothing and selection; a fourth moves the top by less than 0.1 mm."""
@@ -230,9 +220,10 @@ def find_top(points: HeadPoints, crown_radius_m: float, tolerance_m: float, smoo
     t, z = points.t, points.z
     slope = cross_slope(t, points.across, z - rough_level(t, z), points.width_m)
     flat = z - slope * points.across
-    top, noise = _under_disc(t, flat, crown_radius_m, tolerance_m)
+    top = rolling_disc(t, flat, crown_radius_m, tolerance_m) - flat <= tolerance_m
     central = points.within(AXIS_SHARE)
-    band = min(tolerance_m, max(MIN_BAND_M, BAND_SIGMAS * noise))
+    noise_m = robust_sigma((flat - rough_level(t, flat))[top])
+    band = min(tolerance_m, max(MIN_BAND_M, BAND_SIGMAS * noise_m))
     for _ in range(BAND_ROUNDS):
         chosen = top & central if (top & central).sum() >= MIN_POINTS else top
         course = smoothed(t[chosen], flat[chosen], smoothing_m)
@@ -242,19 +233,16 @@ def find_top(points: HeadPoints, crown_radius_m: float, tolerance_m: float, smoo
     return Top(course, points[top], slope[top])
 
 
-def _under_disc(t: np.ndarray, z: np.ndarray, crown_radius_m: float, tolerance_m: float) -> tuple[np.ndarray, float]:
-    """Return the points just below the disc that rolls along the top, (n,) bool, and their noise."""
-    above = z - rough_level(t, z)
-    ordinary = above <= MAX_ABOVE_M
-    highest = _highest(t[ordinary], z[ordinary])
-    surface = extremal_boundary(t[ordinary][highest], z[ordinary][highest], crown_radius_m)
-    depth = np.where(ordinary, surface.closing(np.clip(t, surface.x[0], surface.x[-1])) - z, np.inf)
-    noise = robust_sigma(above[depth <= tolerance_m])
-    return depth <= min(tolerance_m, max(MIN_BAND_M, DISC_DEPTH_SIGMAS * noise)), noise
+def rolling_disc(t: np.ndarray, z: np.ndarray, radius_m: float, tolerance_m: float) -> np.ndarray:
+    """Return the height of the lower side of a disc that rolls along points from above, at each point, (n,) metres.
 
-
-def _highest(t: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """Return the indices, (k,), of the highest point in each short bin; `t` is increasing."""
-    number = np.floor(t / DISC_BIN_M).astype(int)
-    order = np.lexsort((z, number))
-    return order[np.flatnonzero(np.diff(number[order], append=number[-1] + 1))]
+    That is the closing of their heights by the disc. Where it sinks by more than the tolerance between two points, it
+    may sink further.
+    """
+    reach = int(np.sqrt(2 * radius_m * tolerance_m) / DISC_BIN_M) + 1
+    beside_m = DISC_BIN_M * np.arange(-reach, reach + 1)
+    disc = np.sqrt(np.maximum(radius_m**2 - beside_m**2, 0.0)) - radius_m
+    number = np.floor((t - t[0]) / DISC_BIN_M).astype(int) + 2 * reach
+    highest = np.full(number[-1] + 2 * reach + 1, -np.inf)
+    np.maximum.at(highest, number, z)
+    return grey_closing(highest, structure=disc)[number]

@@ -126,11 +126,7 @@ def guide_of(request: Request, lines: Sequence[np.ndarray], distance_m: float, o
     ParameterError
         No line comes near the cloud.
     """
-    extents = np.array([header.extent for header in request.headers])
-    corners = np.array([[*extents[:, :2].min(axis=0), 0.0], [*extents[:, 2:].max(axis=0), 0.0]])
-    if not np.isfinite(corners).all():
-        corners = np.array([[-np.inf, -np.inf, 0.0], [np.inf, np.inf, 0.0]])
-    low, high = request.zero.to_local(corners)[:, :2]
+    low, high = box_of(request, [header.extent for header in request.headers])
     flat = [request.zero.to_local(np.column_stack([line[:, :2], np.zeros(len(line))]))[:, :2] for line in lines]
     guide = Guide.through(flat, distance_m, only, (*low, *high))
     if not len(guide.xy):
@@ -138,6 +134,19 @@ def guide_of(request: Request, lines: Sequence[np.ndarray], distance_m: float, o
             f"The guide has no line within {distance_m:g} m of the cloud: check its place and coordinate system."
         )
     return guide
+
+
+def box_of(request: Request, extents: Sequence[Sequence[float]]) -> tuple[np.ndarray, np.ndarray]:
+    """Return the corners, (2,) metres each, of the box around extents in units of the CRS.
+
+    Headers may state an extent that is not a number; nothing is outside of that.
+    """
+    found = np.array(extents, dtype=float)
+    if not np.isfinite(found).all():
+        return np.full(2, -np.inf), np.full(2, np.inf)
+    corners = [[*found[:, :2].min(axis=0), 0.0], [*found[:, 2:].max(axis=0), 0.0]]
+    low, high = request.zero.to_local(np.array(corners))[:, :2]
+    return low, high
 
 
 def report(figures: SearchFigures, request: Request, progress: Progress) -> None:
@@ -228,6 +237,8 @@ def _sort_file(
     with writing(mine.parent):
         mine.mkdir()
     counts: dict[Key, int] = {}
+    if settings.guide is not None and not settings.guide.reaches(*box_of(request, [header.extent])):
+        return SortedFile(str(mine), counts)
     for points in read_searched(request, header.path, first, context.progress, with_class):
         places = request.zero.to_local(points["xyz"])
         if settings.guide is not None:
@@ -300,7 +311,7 @@ def files_of(key: Key, sorted_files: Sequence[SortedFile]) -> list[Path]:
 
 def read_square(files: Sequence[str | Path]) -> np.ndarray:
     """Read the points of a square and of its margin, (n,) array of POINT."""
-    parts = [np.fromfile(file, np.uint8) for file in files if Path(file).exists()]
+    parts = [np.empty(0, np.uint8), *(np.fromfile(file, np.uint8) for file in files if Path(file).exists())]
     return np.concatenate(parts).view(POINT)  # joining bytes takes a fifth of the time that joining fields does
 
 

@@ -92,7 +92,7 @@ def spool_grown(
 
     def keep(points: np.ndarray) -> None:
         with writing(folder):
-            census.add(RAIL_CLASS, request.zero.to_crs(points["xyz"]), points["mark"], request.zero, side_m, folder)
+            census.add(RAIL_CLASS, points["xyz"], points["mark"], request.zero, side_m, folder)
 
     with writing(folder), scratch_folder(folder) as scratch:
         _, figures = grow_points(request, seeds, settings, scratch, keep, progress)

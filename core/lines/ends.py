@@ -34,19 +34,9 @@ def cut_back(line: np.ndarray, length_m: float) -> np.ndarray:
 
 
 def tip_and_direction(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Fit a straight line to the end of a line.
+    """Fit a straight line to points, (n, 2), from the end of a line inward.
 
-    Parameters
-    ----------
-    points : (n, 2) array
-        Points from the end inward.
-
-    Returns
-    -------
-    tip : (2,) array
-        Foot of the first point on the straight line.
-    outward : (2,) array
-        Unit vector out of the line.
+    Returns the foot of the first point on it, (2,), and the unit vector out of the line, (2,).
     """
     middle = points.mean(axis=0)
     _, _, axes = np.linalg.svd(points - middle, full_matrices=False)
@@ -202,16 +192,10 @@ class PartingLaw:
 
     @classmethod
     def fitted(cls, way: np.ndarray, apart: np.ndarray, power: int, weights: np.ndarray | None = None) -> PartingLaw:
-        """Fit the law to distances by a straight line through their roots.
+        """Fit the law to the way along one rail and the distance of the other one there, (n,) metres each.
 
-        Parameters
-        ----------
-        way, apart : (n,) arrays
-            Way along one rail, and distance of the other one there, metres; negative distances count as 0.
-        power : int
-            `ARC` or `STRAIGHT`.
-        weights : (n,) array, optional
-            Factors of the residuals before squaring.
+        The fit is a straight line through the roots of the distances, of which negative ones count as 0; `weights` are
+        factors of its residuals.
         """
         slope, root = np.polyfit(way, np.maximum(apart, 0.0) ** (1 / power), 1, w=weights)
         return cls(float(slope), float(root), power)
@@ -231,17 +215,6 @@ class PartingLaw:
 
 
 def left_of(line: np.ndarray, at: np.ndarray, left_m: np.ndarray) -> np.ndarray:
-    """Return places next to a line.
-
-    Parameters
-    ----------
-    line : (n, 2) array
-    at, left_m : (k,) arrays
-        Chainage of each place, and its distance to the left of the line, metres.
-
-    Returns
-    -------
-    (k, 2) array
-    """
+    """Return places, (k, 2), at chainages along a line, (n, 2), and distances to the left of it, (k,) metres each."""
     along = length_along(line)
     return interpolate(line, along, at) + left_m[:, None] * interpolate(left_normals(line), along, at)

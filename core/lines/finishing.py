@@ -14,8 +14,12 @@ import numpy as np
 from scipy.linalg import solveh_banded
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
+from ..parameters import Parameters
 from ..polyline import length_along, project, resample, runs
+from ..progress import Progress
 from ..rails import Centerline, RailLine, Support
+
+Line = TypeVar("Line", RailLine, Centerline)
 
 SAME_RAIL_M = 0.03
 """Lines this close together are the same rail: two rails are at least a head apart, two copies of one a few
@@ -88,25 +92,38 @@ ON_ITSELF_M, ON_ITSELF_SHARE = 0.1, 0.5
 the line has turned back onto itself."""
 
 
-def parts_without_turns(line: np.ndarray, min_length_m: float, smoothing_m: float) -> list[tuple[float, float]]:
-    """Return the parts of a line, (n, 2), between the places where it turns too sharply for a rail.
+def finished(lines: Sequence[Line], parameters: Parameters, progress: Progress) -> tuple[Line, ...]:
+    """Split lines where they turn too sharply for rails, warn the user of it, and thin them."""
+    kept: list[Line] = []
+    turned: list[Line] = []
+    step_m = STEP_M if parameters.smoothing_xy_m >= SMOOTHED_M else ROUGH_STEP_M
+    for line in lines:
+        parts = parts_without_turns(line.xyz[:, :2], parameters.min_length_m, step_m)
+        whole = len(parts) == 1 and np.ptp(parts[0]) >= length_along(line.xyz[:, :2])[-1]
+        kept += [line] if whole else [line.part(*part) for part in parts]
+        turned += [] if whole else [line]
+    if turned:
+        what = "rail" if isinstance(turned[0], RailLine) else "centerline"
+        count, was = (f"1 {what} bends", "it was") if len(turned) == 1 else (f"{len(turned)} {what}s bend", "they were")
+        before_m, after_m = (sum(line.length_m for line in some) for some in (lines, kept))
+        progress.warning(
+            f"{count} by more than {MAX_TURN_DEG:g}° within a metre, which rails cannot; {was} split there and "
+            f"{before_m - after_m:.1f} m dropped."
+        )
+    return thin(kept, parameters.simplify_xy_m, parameters.simplify_z_m)
 
-    Parameters
-    ----------
-    line : (n, 2) array
-    min_length_m : float
-        Shorter parts are left out.
-    smoothing_m : float
-        Sigma of PAEK that smoothed the line.
 
-    Returns
-    -------
-    list of tuple of float
-        Chainages of start and end, in order; a line without such a place is a single part, however short. A part that
-        runs back over a longer one is left out.
+def parts_without_turns(
+    line: np.ndarray, min_length_m: float, step_m: float, max_turn_deg: float = MAX_TURN_DEG
+) -> list[tuple[float, float]]:
+    """Return the parts of a line, (n, 2), from chainage to chainage, between places where it turns too much for a rail.
+
+    A line without such a place is a single part, however short. Parts shorter than `min_length_m` are left out, and so
+    is a part that runs back over a longer one. Directions are measured between stations `step_m` apart.
     """
-    stations, t = resample(line, STEP_M if smoothing_m >= SMOOTHED_M else ROUGH_STEP_M)
-    bends = _bends(stations, t)
+    stations, t = resample(line, step_m)
+    sharp = _turns(stations, t) > np.radians(max_turn_deg)
+    bends = [(float(t[first]), float(t[last + 1])) for first, last in runs(sharp)]
     if not bends:
         return [(0.0, float(t[-1]))]
     borders = [0.0, *(border for bend in bends for border in bend), float(t[-1])]
@@ -133,14 +150,6 @@ def _turns(stations: np.ndarray, t: np.ndarray) -> np.ndarray:
     return maximum_filter1d(direction, sections) - minimum_filter1d(direction, sections)
 
 
-def _bends(stations: np.ndarray, t: np.ndarray) -> list[tuple[float, float]]:
-    """Return the chainages of the start and the end of the sections that turn too much."""
-    sharp = _turns(stations, t) > np.radians(MAX_TURN_DEG)
-    return [(float(t[first]), float(t[last + 1])) for first, last in runs(sharp)]
-
-
-Line = TypeVar("Line", RailLine, Centerline)
-
 EXACT_M = 1e-9
 """Smallest effective tolerance: a vertex closer to the chord is dropped even at a tolerance of zero."""
 
@@ -148,11 +157,7 @@ EXACT_M = 1e-9
 def thin(lines: Sequence[Line], tolerance_xy_m: float, tolerance_z_m: float) -> tuple[Line, ...]:
     """Drop needless vertices of lines, but none in which another line ends, so that lines stay connected.
 
-    Parameters
-    ----------
-    lines : sequence of RailLine or Centerline
-    tolerance_xy_m, tolerance_z_m : float
-        Largest distance of a dropped vertex from the result, in plan and in height.
+    The tolerances are the largest distances of a dropped vertex from the result, in plan and in height.
     """
     ends = np.unique([_as_complex(line.xyz[[0, -1]]) for line in lines])
     return tuple(replace(line, xyz=_thinned(line.xyz, ends, tolerance_xy_m, tolerance_z_m)) for line in lines)
@@ -172,21 +177,9 @@ def _thinned(xyz: np.ndarray, ends: np.ndarray, tolerance_xy_m: float, tolerance
 
 
 def essential_vertices(xyz: np.ndarray, tolerance_xy_m: float, tolerance_z_m: float) -> np.ndarray:
-    """Mark the vertices needed to keep a line within the tolerances (Douglas and Peucker, 1973).
+    """Mark the vertices, (n,) bool, needed to keep a line, (n, 3), within the tolerances (Douglas and Peucker, 1973).
 
-    Plan and height are judged together, so that the line keeps both tolerances.
-
-    Parameters
-    ----------
-    xyz : (n, 3) array
-        Heights may be NaN; then only the plan counts.
-    tolerance_xy_m, tolerance_z_m : float
-        Largest distance of a vertex from the line, in plan and in height.
-
-    Returns
-    -------
-    (n,) bool array
-        The first and the last are always marked.
+    Plan and height are judged together, so that the line keeps both tolerances; without heights, NaN, the plan counts.
     """
     keep = np.zeros(len(xyz), dtype=bool)
     keep[[0, -1]] = True

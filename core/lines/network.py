@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from .ends import cut_back, turned
+from .ends import Bridge, cut_back, turned
 
 
 @dataclass(frozen=True)
@@ -61,15 +61,7 @@ class LineNetwork:
         return (length - count, length) if end % 2 else (0, count)
 
     def meets(self, number: int, first: int, last: int) -> bool:
-        """Return whether other lines meet a line at some of its vertices.
-
-        Parameters
-        ----------
-        number : int
-            The line.
-        first, last : int
-            First of the vertices, and one more than the last.
-        """
+        """Return whether other lines meet a line at one of its vertices `first` to `last` - 1."""
         return bool(self._passing(number, first, last).any())
 
     def with_end(self, end: int, vertices: np.ndarray, replaced: int, at: tuple[int, int] | None = None) -> LineNetwork:
@@ -173,6 +165,31 @@ class LineNetwork:
         passes += self._moved_passes(place)
         welded_ends, welded_passes = np.array(ends, dtype=np.int64), np.array(passes, dtype=np.int64)
         return LineNetwork(tuple(lines), self.nodes, welded_ends.reshape(-1, 2), welded_passes.reshape(-1, 3)).tidy()
+
+    def bridged(
+        self, joins: Mapping[tuple[int, int], Bridge], cuts_m: Mapping[int, float], dropped: Collection[int] = ()
+    ) -> LineNetwork:
+        """Join pairs of line ends by bridges.
+
+        Parameters
+        ----------
+        joins : mapping of (end, end) to Bridge
+            Each from the first end to the second.
+        cuts_m : mapping of end to float
+            Lengths cut off before the bridges were found; an end that is not joined becomes free.
+        dropped : collection of int
+            Lines to leave out.
+        """
+        cuts_m, partner, points = dict(cuts_m), {}, {}
+        keep = ~np.isin(np.arange(len(self.lines)), list(dropped))
+        number = np.cumsum(keep) - 1
+        for ends, found in joins.items():
+            for end, more_m in zip(ends, found.cuts_m):
+                cuts_m[end] = cuts_m.get(end, 0.0) + more_m
+            one, other = (2 * int(number[end // 2]) + end % 2 for end in ends)
+            partner[one], partner[other] = other, one
+            points[one], points[other] = found.points, found.points[::-1]
+        return self.cut_back(cuts_m).select(keep).weld(partner, points)
 
     def _moved_passes(self, place: Mapping[int, tuple[int, int, bool]]) -> list[tuple[int, int, int]]:
         """List the passes of joined lines, given each line's new number, first vertex there, and direction."""

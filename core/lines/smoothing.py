@@ -87,21 +87,7 @@ def repeated(t: np.ndarray, vertices: np.ndarray, end: float, sigma_m: float) ->
     """Chain copies of a line until they cover the reach of the kernel around the positions 0 to `end`.
 
     A closed line repeats in place. A line followed by its reflection repeats with a shift, which reflects it at both
-    ends.
-
-    Parameters
-    ----------
-    t : (n,) array
-        Position along the line, from 0.
-    vertices : (n, d) array
-    end : float
-        Position up to which stations are wanted.
-    sigma_m : float
-
-    Returns
-    -------
-    t : (m,) array
-    vertices : (m, d) array
+    ends. Given and returned are positions along the line, (n,) from 0, and vertices, (n, d).
     """
     reach = REACH_SIGMAS * sigma_m
     period, shift = t[-1], vertices[-1] - vertices[0]
@@ -150,13 +136,7 @@ def _scan(steps: np.ndarray, *moments: np.ndarray) -> list[np.ndarray]:
 def _shifted(moments: np.ndarray, powers: Sequence[np.ndarray], decay: np.ndarray) -> np.ndarray:
     """Convert moments, (k, d, n), to vertices further along: (u + by)^k exp(-by) by the binomial theorem.
 
-    Parameters
-    ----------
-    moments : (k, d, n) array
-    powers : sequence of (n,) arrays
-        Powers of the distances `by`, from 0.
-    decay : (n,) array
-        exp(-by).
+    Given are the powers of the distances `by`, from 0, and `decay` = exp(-by), (n,) each.
     """
     shifted = np.empty_like(moments)
     for order in range(len(moments)):
@@ -310,21 +290,10 @@ def smooth_network(network: LineNetwork, sigma_m: float, progress: Progress = SI
 
 
 def bend_through(line: np.ndarray, t: np.ndarray, places: np.ndarray, targets: np.ndarray) -> None:
-    """Bend a line, in place, so that some of its vertices are at their targets; the correction fades along the line.
+    """Bend a line, (n, 2), in place, so that its vertices `places` are at their targets, (k, 2).
 
-    Vertices further apart than the reach of the correction form separate systems of equations, so that time and memory
-    grow linearly with the length of a line.
-
-    Parameters
-    ----------
-    line : (n, 2) array
-        Changed in place.
-    t : (n,) array
-        Chainage of its vertices in sigma, not decreasing.
-    places : (k,) int array
-        Vertices to move.
-    targets : (k, 2) array
-        Where to.
+    The correction fades along the line; `t` is the chainage of its vertices in sigma. Vertices further apart than the
+    reach of the correction form separate systems of equations, so that time and memory grow linearly with the length.
     """
     order = np.argsort(places, kind="stable")
     places, targets = places[order], targets[order]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Optional
 
 from ..alignment.delivery import Delivery, check_joined
 from ..alignment.elements import Alignment
@@ -71,19 +70,15 @@ def write_designs(
         Of this program.
     """
     kind = FORMATS[path.suffix.lower()]
-    delivery = _delivery(standard, alignments[0].frame.crs_wkt, version)
+    wkt = alignments[0].frame.crs_wkt
+    epsg, system, heights = codes_and_names(parse_crs(wkt)) if wkt else (None, "", "")
+    delivery = Delivery(standard.gauge_m, standard.head_width_m, epsg, system, heights, version)
     if kind == "LandXML":
         write_landxml(path, alignments, delivery, circles)
     elif kind == "IFC":
         write_ifc(path, alignments, delivery)
     else:
         write_alignments(path, alignments)
-
-
-def _delivery(standard: RailStandard, crs_wkt: Optional[str], version: str) -> Delivery:
-    """Return what the file states besides the alignments."""
-    epsg, system, heights = codes_and_names(parse_crs(crs_wkt)) if crs_wkt else (None, "", "")
-    return Delivery(standard.gauge_m, standard.head_width_m, epsg, system, heights, version)
 
 
 def check_place(name: str, frame: LocalFrame, east_first: bool, progress: Progress) -> None:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -77,28 +76,39 @@ def _write_for_others(layer: Layer, destination: Destination, frame: LocalFrame)
 def _write_layer(layer: Layer, frame: LocalFrame, file: Path) -> None:
     """Write a layer, in place of the one of this name that the file has."""
     product = layer.product
-    columns = [column_of(field, values) for field, values in zip(product.fields, layer.written_columns())]
+    columns = {one.name: column_of(one, values) for one, values in zip(product.fields, layer.written_columns())}
     kind = ("LineString" if product.is_line else "Point") + ("" if layer.is_flat else " Z")
-    with as_os_error():
+    write_table(
+        file, product.name, _geometry(layer, frame), "Unknown" if layer.is_measured else kind, columns, frame.crs_wkt
+    )
+
+
+def write_table(
+    file: Path,
+    layer: str,
+    shapes: np.ndarray,
+    kind: str,
+    columns: Mapping[str, tuple[np.ndarray, np.ndarray | None]],
+    crs_wkt: str | None,
+) -> None:
+    """Write features into a GeoPackage, in place of the layer of this name that it has.
+
+    `shapes` are well-known binary, (n,); a column has its values, and where there are none, (n,) each. What GDAL raises
+    becomes an `OSError`, which a destination explains.
+    """
+    try:
         pyogrio.raw.write(
             str(file),
-            layer=product.name,
+            layer=layer,
             driver="GPKG",
-            geometry=_geometry(layer, frame),
-            geometry_type="Unknown" if layer.is_measured else kind,
-            field_data=[column for column, _ in columns],
-            field_mask=[empty for _, empty in columns],
-            fields=[field.name for field in product.fields],
-            crs=frame.crs_wkt or UNKNOWN_IN_METRES,
+            geometry=shapes,
+            geometry_type=kind,
+            field_data=[values for values, _ in columns.values()],
+            field_mask=[empty for _, empty in columns.values()],
+            fields=list(columns),
+            crs=crs_wkt or UNKNOWN_IN_METRES,
             nan_as_null=True,
         )
-
-
-@contextmanager
-def as_os_error() -> Iterator[None]:
-    """Turn what GDAL raises into an `OSError`, which a destination explains."""
-    try:
-        yield
     except (pyogrio.errors.DataSourceError, pyogrio.errors.DataLayerError, RuntimeError) as error:
         raise OSError(str(error)) from error
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..tracks.geometry import TWIST_BASE_M
 from .findings import GAUGE_OFF_MM, UNSUPPORTED, UNSURE_MM, TrackFindings
-from .markup import metres, tag, text
+from .markup import metres, note, tag, text
 
 MAX_LIMIT_MM = 500
 """Largest limit for which lengths are held: more than the cant of any track."""
@@ -93,7 +93,7 @@ def limits_table(tracks: Sequence[TrackFindings]) -> str:
     rows = [_row(quantity, track) for quantity in QUANTITIES for track in tracks]
     written = tag("table", tag("thead", head), tag("tbody", *rows), class_="quantities")
     inputs = tag("p", *map(_input, QUANTITIES), class_="limits")
-    return inputs + tag("div", written, class_="scroll tall") + tag("p", text(NOTE), class_="notes") + _script()
+    return inputs + tag("div", written, class_="scroll tall") + note(NOTE) + f"<script>{SCRIPT}</script>"
 
 
 def lengths_beyond(values_mm: np.ndarray, length_m: np.ndarray) -> np.ndarray:
@@ -141,7 +141,3 @@ def _row(quantity: Quantity, track: TrackFindings) -> str:
     lengths = " ".join(f"{one:.1f}" for one in beyond_m)
     content = (tag("td", text(cell)) for cell in cells)
     return tag("tr", *content, data_quantity=quantity.name, data_length=f"{length_m:.1f}", data_beyond=lengths)
-
-
-def _script() -> str:
-    return f"<script>{SCRIPT}</script>"

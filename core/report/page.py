@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -171,73 +171,41 @@ def _findings(findings: Findings) -> str:
     found = listed(findings)
     if not found:
         return ""
-    headings = [
-        "Finding",
-        "Where",
-        "Chainage",
-        "In doubt",
-        "Worst at",
-        "Gauge",
-        "Standard error across",
-        "in height",
-        "Why",
-    ]
-    rows: list[tuple[object, ...]] = list(map(_finding, found))
-    if any(finding.km_text for finding in found):
-        headings.append("Kilometre of the worst place")
-        rows = [(*row, finding.km_text or "") for row, finding in zip(rows, found)]
+    columns: dict[str, Callable[[Finding], object]] = {
+        "Finding": lambda one: one.finding,
+        "Where": lambda one: f"track {one.track_id}" if one.rail_id is None else f"rail {one.rail_id}",
+        "Chainage": lambda one: f"{one.from_m:,.1f} to {one.to_m:,.1f} m" if np.isfinite(one.from_m) else "",
+        "In doubt": lambda one: metres(one.doubt_m),
+        "Worst at": lambda one: figure(one.worst_m, unit="m", unknown=""),
+        "Gauge": lambda one: figure(one.gauge_mm, unknown=""),
+        "Standard error across": lambda one: figure(one.sigma_mm, unknown=""),
+        "in height": lambda one: figure(one.sigmaz_mm, unknown=""),
+        "Why": lambda one: one.reason,
+    }
+    if any(one.km_text for one in found):
+        columns["Kilometre of the worst place"] = lambda one: one.km_text or ""
+    rows = [[cell(one) for cell in columns.values()] for one in found]
     order = "The first findings may do most harm: they are in the order of possible error times length."
-    return section("Where to look", table(headings, rows, "scroll tall", "words"), note(order))
-
-
-def _finding(finding: Finding) -> tuple[object, ...]:
-    where = f"track {finding.track_id}" if finding.rail_id is None else f"rail {finding.rail_id}"
-    return (
-        finding.finding,
-        where,
-        f"{finding.from_m:,.1f} to {finding.to_m:,.1f} m" if np.isfinite(finding.from_m) else "",
-        metres(finding.doubt_m),
-        figure(finding.worst_m, unit="m", unknown=""),
-        *(figure(one, unknown="") for one in (finding.gauge_mm, finding.sigma_mm, finding.sigmaz_mm)),
-        finding.reason,
-    )
+    return section("Where to look", table(columns, rows, "scroll tall", "words"), note(order))
 
 
 def _tracks(findings: Findings) -> str:
     """Write the table of tracks."""
-    headings = [
-        "Track",
-        "Length",
-        "Gauge",
-        "Cant",
-        "Twist",
-        "Tightest radius",
-        "Gradient",
-        "Standard error across",
-        "in height",
-        "No points",
-    ]
-    rows: list[tuple[str, ...]] = [_row(track) for track in findings.tracks]
+    columns: dict[str, Callable[[TrackFindings], object]] = {
+        "Track": lambda one: one.line.track_id,
+        "Length": lambda one: metres(one.length_m),
+        "Gauge": lambda one: f"{one.line.gauge_mm:.1f} ± {one.line.gaugesd_mm:.1f} mm",
+        "Cant": lambda one: _span(one.geometry.cant_mm, "mm"),
+        "Twist": lambda one: _span(one.geometry.twist_mm, "mm"),
+        "Tightest radius": lambda one: _tightest(one.geometry.radius_m),
+        "Gradient": lambda one: _span(one.geometry.grade_pm, "‰"),
+        "Standard error across": lambda one: figure(median(one.geometry.sigma_mm)),
+        "in height": lambda one: figure(median(one.geometry.sigmaz_mm)),
+        "No points": lambda one: metres(one.length_of(UNSUPPORTED)),
+    }
     if any(track.geometry.kilometres is not None for track in findings.tracks):
-        headings.append("Kilometres")
-        rows = [(*row, _kilometres(track)) for row, track in zip(rows, findings.tracks)]
-    return section("Tracks", table(headings, rows))
-
-
-def _row(track: TrackFindings) -> tuple[str, ...]:
-    line, geometry = track.line, track.geometry
-    return (
-        str(line.track_id),
-        metres(track.length_m),
-        f"{line.gauge_mm:.1f} ± {line.gaugesd_mm:.1f} mm",
-        _span(geometry.cant_mm, "mm"),
-        _span(geometry.twist_mm, "mm"),
-        _tightest(geometry.radius_m),
-        _span(geometry.grade_pm, "‰"),
-        figure(median(geometry.sigma_mm)),
-        figure(median(geometry.sigmaz_mm)),
-        metres(track.length_of(UNSUPPORTED)),
-    )
+        columns["Kilometres"] = _kilometres
+    return section("Tracks", table(columns, [[cell(one) for cell in columns.values()] for one in findings.tracks]))
 
 
 def _kilometres(track: TrackFindings) -> str:

@@ -90,15 +90,7 @@ def occupied_squares(sources: Sequence[PointSource], source: PointSource) -> lis
 
 
 def warn_of_unexplained(source: PointSource, rails: Sequence[RailLine], progress: Progress = SILENT) -> None:
-    """Warn the user if most points of a class are far from all rails that were found, as if it were another class.
-
-    Parameters
-    ----------
-    source : PointSource
-    rails : sequence of RailLine
-        In the frame of the source.
-    progress : Progress
-    """
+    """Warn the user if most points of a class are far from all rails, in its frame, as if it were another class."""
     near, total = 0, 0
     for square in _fullest(source)[:FULLEST]:
         shift = source.frame.shift_to(square.frame)
@@ -172,22 +164,9 @@ def _why_thin(source: PointSource) -> str | None:
 
 
 def _company(xyz: np.ndarray, side_m: float, rings: int) -> tuple[np.ndarray, np.ndarray]:
-    """Count points by cells of the plane and the rings of cells around.
+    """Count points, (n, 3), by cells of a side; points in the `rings` of cells around a cell count as well.
 
-    Parameters
-    ----------
-    xyz : (n, 3) array
-    side_m : float
-        Side of the cells.
-    rings : int
-        Rings around a cell whose points count as well.
-
-    Returns
-    -------
-    number : (n,) int array
-        Number of the cell of each point.
-    company : (m,) int array
-        Points in each cell and the rings.
+    Returns the number of the cell of each point, (n,), and the points in each cell and its rings, (m,).
     """
     columns, rows = np.floor(xyz[:, :2] / side_m).astype(np.int64).T
     cells, number, counts = np.unique(rows * _ROW + columns, return_inverse=True, return_counts=True)

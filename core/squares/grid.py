@@ -135,21 +135,9 @@ class MemorySource:
 
 
 def unique_keys(xyz_m: np.ndarray, side_m: float) -> tuple[list[Key], np.ndarray]:
-    """Find the squares in which points are.
+    """Find the squares of a side in which points, (n, 2) or (n, 3) metres from the zero of the coordinate system, are.
 
-    Parameters
-    ----------
-    xyz_m : (n, 2) or (n, 3) array
-        Metres from the zero of the coordinate system.
-    side_m : float
-        Side of the squares.
-
-    Returns
-    -------
-    keys : list of Key
-        The squares, in ascending order.
-    number : (n,) int array
-        Index into `keys` for each point.
+    Returns the squares, in ascending order, and for each point the number of its square among them, (n,).
     """
     if not len(xyz_m):
         return [], np.empty(0, dtype=np.int64)
@@ -231,15 +219,9 @@ def own_tiles(raster: RailRaster, square: Square) -> RailRaster:
 
 
 def mosaic(rasters: Mapping[Key, RailRaster], square: Square, margin: int) -> RailRaster:
-    """Combine the raster of a square with the tiles of its neighbours around it.
+    """Combine the raster of a square with `margin` tiles of its neighbours' around it.
 
-    Parameters
-    ----------
-    rasters : mapping of Key to RailRaster
-        That of the square and those of its neighbours, each with its origin at the corner of its own square.
-    square : Square
-    margin : int
-        Width, in tiles, of the surroundings to include.
+    Each raster has its origin at the corner of its own square; that of a neighbour may be missing.
     """
     own = rasters[square.key]
     if square.is_whole_plane:
@@ -255,15 +237,7 @@ def mosaic(rasters: Mapping[Key, RailRaster], square: Square, margin: int) -> Ra
 
 
 def assembled(rasters: Mapping[Key, RailRaster], squares: Mapping[Key, Square], frame: LocalFrame) -> RailRaster:
-    """Combine the rasters of all squares into one.
-
-    Parameters
-    ----------
-    rasters : mapping of Key to RailRaster
-    squares : mapping of Key to Square
-    frame : LocalFrame
-        Local frame of the result.
-    """
+    """Combine the rasters of all squares into one in a local frame."""
     first = min(rasters)
     if squares[first].is_whole_plane:
         return rasters[first]

@@ -57,16 +57,7 @@ class SquareRails:
 
 
 def trim(rails: Sequence[RailLine], square: Square, strips: np.ndarray = NO_STRIPS) -> SquareRails:
-    """Cut the lines of a square where they stop being valid, and keep the offsets of strips inside.
-
-    Parameters
-    ----------
-    rails : sequence of RailLine
-        In local metres of the square.
-    square : Square
-    strips : (k, 7) array
-        See `strips.rows_of`.
-    """
+    """Cut the lines of a square, in its local metres, where they stop being valid, and keep the strips inside."""
     parts: list[RailLine] = []
     for rail in rails:
         stations, t = resample(rail.xyz[:, :2], CUT_STEP_M)
@@ -126,20 +117,9 @@ class Piece:
 
 
 def parts_near(rails: Sequence[RailLine], square: Square, corner: np.ndarray, margin_m: float) -> list[np.ndarray]:
-    """Cut the parts of rails out that are in a square or near it.
+    """Cut out the parts of rails, (n, 2) each, in a square or at most `margin_m` outside.
 
-    Parameters
-    ----------
-    rails : sequence of RailLine
-    square : Square
-    corner : (2,) array
-        Corner of the square in the frame of the rails.
-    margin_m : float
-        Width of the surroundings that count as near.
-
-    Returns
-    -------
-    list of (n, 2) arrays
+    Given is the corner of the square, (2,), in the frame of the rails.
     """
     parts = []
     for rail in rails:
@@ -154,23 +134,10 @@ def parts_near(rails: Sequence[RailLine], square: Square, corner: np.ndarray, ma
 def new_parts(
     rail: RailLine, known: Sequence[np.ndarray], cut: np.ndarray, square: Square, corner: np.ndarray
 ) -> list[tuple[float, float]]:
-    """Find the parts of a square's rail that known lines do not show.
+    """Find the parts of a square's rail, from chainage to chainage, that lines of earlier squares do not show.
 
-    Parameters
-    ----------
-    rail : RailLine
-    known : sequence of (n, 2) arrays
-        Lines of earlier squares.
-    cut : (2,) bool array
-        Whether the rail was cut at its start and at its end.
-    square : Square
-    corner : (2,) array
-        Corner of the square in the frame of the rail.
-
-    Returns
-    -------
-    list of tuple of float
-        Chainages of start and end of each part.
+    Given are these lines, (n, 2) each, whether the rail was `cut` at its start and at its end, and the corner of the
+    square, (2,), in the frame of the rail.
     """
     stations, t = resample(rail.xyz[:, :2], CUT_STEP_M)
     seen = np.zeros(len(t), dtype=bool)
@@ -205,14 +172,8 @@ def _without_short_matches(seen: np.ndarray, t: np.ndarray) -> np.ndarray:
 def blended(part: RailLine, side: int, following: RailLine) -> RailLine:
     """Blend one end of a line into the line that continues it, over twice `HALO_M`.
 
-    Where the other line is shorter than that, as near a corner of squares, its last known offset is used.
-
-    Parameters
-    ----------
-    part : RailLine
-    side : int
-        0 to blend its start, 1 to blend its end.
-    following : RailLine
+    Where the other line is shorter than that, as near a corner of squares, its last known offset is used. The end is
+    the start (`side` 0) or the end (1).
     """
     xyz = (part.xyz if side else part.xyz[::-1]).copy()
     along = length_along(xyz[:, :2])

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -25,14 +26,8 @@ over 1 m at most 3 m, and that of the lateral figures 2.4 m."""
 LOOKUP_STEP_M = 1.0
 """Spacing of the stations whose square is looked up."""
 
-
-@dataclass(frozen=True)
-class _Section:
-    """The part of a rail in a square: index of the rail, and chainages."""
-
-    number: int
-    start: float
-    end: float
+Section = tuple[int, float, float]
+"""The part of a rail in a square: number of the rail, and chainages of start and end."""
 
 
 def measure_rails(
@@ -66,53 +61,26 @@ def measure_rails(
     """
     measured, widths_m = list(rails), np.broadcast_to(head_width_m, len(rails))
     for source, share in zip(sources, progress.split(len(sources))):
-        numbers = [number for number, rail in enumerate(rails) if rail.class_code == source.class_code]
-        squares = lay_out(sources, source)
-        measure = _measure_undivided if squares[0].is_whole_plane else _measure_in_squares
-        own = widths_m[numbers]
-        again = measure([rails[number] for number in numbers], source, squares, (own, align), runner, share)
-        for number, rail in zip(numbers, again):
-            measured[number] = rail
+        squares = {square.key: square for square in lay_out(sources, source)}
+        sections = _sections(rails, source, squares)
+        tasks = {}
+        for key in sorted(sections):
+            square = squares.setdefault(key, Square.on_grid(key, source.side_m, source.frame))
+            pieces = tuple(_with_context(rails[one[0]], one, square, source) for one in sections[key])
+            label = f"Measuring the rails of class {source.class_code} in square {key}"
+            own = widths_m[[number for number, _, _ in sections[key]]]
+            tasks[key] = Task(label, _measure, (source.part(square), square, pieces, own, align))
+        parts: dict[int, list[tuple[float, RailLine]]] = defaultdict(list)
+        for key, pieces in runner.run(tasks, share):
+            shift = squares[key].frame.shift_to(source.frame)
+            for (number, start, end), piece in zip(sections[key], pieces):
+                before = min(start, CONTEXT_M)
+                part = piece.between(before, before + end - start)
+                parts[number].append((start, replace(part, xyz=part.xyz + shift)))
+        for number, found in parts.items():
+            whole = united([part for _, part in sorted(found, key=lambda part: part[0])])
+            measured[number] = _straight_across_gaps(whole)
     return measured
-
-
-def _measure_undivided(
-    rails: Sequence[RailLine],
-    source: PointSource,
-    squares: Sequence[Square],
-    settings: tuple[np.ndarray, bool],
-    runner: Runner,
-    progress: Progress,
-) -> Sequence[RailLine]:
-    task = Task("Measuring the rails", _measure, (source, squares[0], tuple(rails), *settings))
-    return dict(runner.run({"measure": task}, progress)).get("measure", rails)
-
-
-def _measure_in_squares(
-    rails: Sequence[RailLine],
-    source: PointSource,
-    squares: Sequence[Square],
-    settings: tuple[np.ndarray, bool],
-    runner: Runner,
-    progress: Progress,
-) -> list[RailLine]:
-    by_key, (widths_m, align) = {square.key: square for square in squares}, settings
-    sections = _sections_by_square(rails, source)
-    tasks = {}
-    for key in sorted(sections):
-        square = by_key.setdefault(key, Square.on_grid(key, source.side_m, source.frame))
-        pieces = tuple(_with_context(rails[one.number], one, square, source) for one in sections[key])
-        label = f"Measuring the rails of class {source.class_code} in square {key}"
-        own = widths_m[[one.number for one in sections[key]]]
-        tasks[key] = Task(label, _measure, (source.part(square), square, pieces, own, align))
-    parts: list[list[tuple[float, RailLine]]] = [[] for _ in rails]
-    for key, pieces in runner.run(tasks, progress):
-        shift = by_key[key].frame.shift_to(source.frame)
-        for section, piece in zip(sections[key], pieces):
-            before = min(section.start, CONTEXT_M)
-            part = piece.between(before, before + section.end - section.start)
-            parts[section.number].append((section.start, replace(part, xyz=part.xyz + shift)))
-    return [_joined(found) if found else rail for found, rail in zip(parts, rails)]
 
 
 def _measure(
@@ -128,15 +96,11 @@ def _measure(
     return tuple(measure_again(rails, points, widths_m, PROFILE_SIGMA_M, context.progress, align))
 
 
-def _with_context(rail: RailLine, section: _Section, square: Square, source: PointSource) -> RailLine:
+def _with_context(rail: RailLine, section: Section, square: Square, source: PointSource) -> RailLine:
     """Cut a section out of a rail, with `CONTEXT_M` on either side, and move it into the frame of the square."""
-    piece = rail.between(section.start - CONTEXT_M, section.end + CONTEXT_M)
+    _, start, end = section
+    piece = rail.between(start - CONTEXT_M, end + CONTEXT_M)
     return replace(piece, xyz=piece.xyz - square.frame.shift_to(source.frame))
-
-
-def _joined(parts: Sequence[tuple[float, RailLine]]) -> RailLine:
-    """Join the measured parts of a rail, given with their chainages."""
-    return _straight_across_gaps(united([part for _, part in sorted(parts, key=lambda part: part[0])]))
 
 
 def _straight_across_gaps(rail: RailLine) -> RailLine:
@@ -150,16 +114,24 @@ def _straight_across_gaps(rail: RailLine) -> RailLine:
     return replace(rail, xyz=xyz)
 
 
-def _sections_by_square(rails: Sequence[RailLine], source: PointSource) -> Mapping[Key, list[_Section]]:
-    """Divide rails among the squares that they cross; the sections of a rail follow each other without gaps."""
+def _sections(
+    rails: Sequence[RailLine], source: PointSource, squares: Mapping[Key, Square]
+) -> dict[Key, list[Section]]:
+    """Divide the rails of a class among the squares that they cross; the sections of a rail follow without gaps."""
+    whole = next((key for key, square in squares.items() if square.is_whole_plane), None)
     zero = Square.on_grid((0, 0), source.side_m, source.frame).frame.shift_to(source.frame)
-    sections: dict[Key, list[_Section]] = {}
+    sections: dict[Key, list[Section]] = defaultdict(list)
     for number, rail in enumerate(rails):
+        if rail.class_code != source.class_code:
+            continue
         stations, t = resample(rail.xyz[:, :2], LOOKUP_STEP_M)
+        if whole is not None:
+            sections[whole].append((number, 0.0, float(t[-1])))
+            continue
         keys, index = unique_keys(stations - zero[:2], source.side_m)
         for place, key in enumerate(keys):
             for first, last in runs(index == place):
                 start = 0.0 if first == 0 else 0.5 * (t[first - 1] + t[first])
                 end = t[-1] if last == len(t) - 1 else 0.5 * (t[last] + t[last + 1])
-                sections.setdefault(key, []).append(_Section(number, float(start), float(end)))
+                sections[key].append((number, float(start), float(end)))
     return sections

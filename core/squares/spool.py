@@ -9,6 +9,7 @@ import hashlib
 import json
 import os
 import zlib
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -228,8 +229,11 @@ def gather(request: Request, side_m: float, found: Sequence[SpooledFile]) -> tup
     codes = sorted({int(code) for file in found for code in file.report["classes"]})
     if not codes:
         raise request.explain_none(np.sum([file.report["census"] for file in found], axis=0))
-    steps = [_merged([file.report["steps"][axis] for file in found]) for axis in range(3)]
-    frame = request.frame_at([(np.array(list(one)), np.array(list(one.values()))) for one in steps])
+    steps: list[Counter[float]] = [Counter(), Counter(), Counter()]
+    for total, axis in zip(steps, range(3)):
+        for file in found:
+            total.update(dict(file.report["steps"][axis]))
+    frame = request.frame_at([tuple(np.array(sorted(one.items())).T) for one in steps])
     rows = [
         (mark, *key)
         for file in found
@@ -247,31 +251,25 @@ class Census:
     def __init__(self) -> None:
         self.census = np.zeros(256, dtype=np.int64)
         self._classes: dict[int, dict] = {}
-        self._steps: list[dict[float, int]] = [{}, {}, {}]
+        self._steps: list[Counter[float]] = [Counter(), Counter(), Counter()]
 
     def add(self, code: int, xyz: np.ndarray, marks: np.ndarray, zero: LocalFrame, side_m: float, folder: Path) -> None:
         """Append points of one class, (n, 3) in units of the CRS, to the files of their squares and marks, (n,)."""
-        for mark in np.unique(marks).tolist():
-            self._add(code, mark, xyz[marks == mark], zero, side_m, folder)
-
-    def _add(self, code: int, mark: int, xyz: np.ndarray, zero: LocalFrame, side_m: float, folder: Path) -> None:
-        """Append points of one class and mark."""
         new = {"squares": {}, "checks": {}, "low": [np.inf] * 2, "high": [-np.inf] * 2}
         mine = self._classes.setdefault(code, new)
-        for key, numbers in points_by_square(zero.to_local(xyz), side_m).items():
-            part = xyz[numbers]
-            name = f"{code}_{key[0]}_{key[1]}_{mark}"
-            data = part.tobytes()
-            with (folder / name).open("ab") as file:
-                file.write(data)
-            mine["checks"][name] = zlib.crc32(data, mine["checks"].get(name, 0))
-            mine["squares"][name] = mine["squares"].get(name, 0) + len(part)
+        for mark in np.unique(marks).tolist():
+            own = xyz[marks == mark]
+            for key, numbers in points_by_square(zero.to_local(own), side_m).items():
+                name, data = f"{code}_{key[0]}_{key[1]}_{mark}", own[numbers].tobytes()
+                with (folder / name).open("ab") as file:
+                    file.write(data)
+                mine["checks"][name] = zlib.crc32(data, mine["checks"].get(name, 0))
+                mine["squares"][name] = mine["squares"].get(name, 0) + len(numbers)
         mine["low"] = np.minimum(mine["low"], xyz[:, :2].min(axis=0)).tolist()
         mine["high"] = np.maximum(mine["high"], xyz[:, :2].max(axis=0)).tolist()
-        self._steps = [
-            _merged([list(steps.items()), np.transpose(np.unique(column, return_counts=True)).tolist()])
-            for steps, column in zip(self._steps, origin_steps(xyz).T)
-        ]
+        for steps, column in zip(self._steps, origin_steps(xyz).T):
+            values, counts = np.unique(column, return_counts=True)
+            steps.update(dict(zip(values.tolist(), counts.tolist())))
 
     def report(self) -> dict:
         """Return `SpooledFile.report`."""
@@ -281,15 +279,6 @@ class Census:
             "census": self.census.tolist(),
             "steps": [list(map(list, steps.items())) for steps in self._steps],
         }
-
-
-def _merged(counts: Sequence[Sequence[Sequence[float]]]) -> dict[float, int]:
-    """Add up the counts in lists of value and count; the result is in ascending order of value."""
-    total: dict[float, int] = {}
-    for one in counts:
-        for value, count in one:
-            total[value] = total.get(value, 0) + int(count)
-    return dict(sorted(total.items()))
 
 
 def _numbers(file: str) -> list[int]:

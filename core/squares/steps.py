@@ -5,13 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import TypeVar
 
 import numpy as np
 
 from ..classify.thin import SURROUNDINGS_M, drawn
 from ..clouds.points import RailPoints
-from ..errors import NoTrackError, ParameterError
+from ..errors import ParameterError
 from ..frame import LocalFrame
 from ..frpdf.cleanup import MARGIN, clean, max_passes
 from ..frpdf.engine import Engine, make_engine
@@ -22,16 +21,13 @@ from ..heads.refinement import refine
 from ..heads.roads import onto_heads
 from ..heads.strips import measure_strips, rows_of
 from ..lines.ends import FIT_M
-from ..lines.finishing import MAX_TURN_DEG, parts_without_turns, thin
+from ..lines.finishing import finished
 from ..lines.network import LineNetwork
 from ..lines.smoothing import smooth_network
 from ..parameters import ALIGNED, Parameters
-from ..polyline import length_along
 from ..progress import SILENT, Progress
-from ..rails import Centerline, RailLine
+from ..rails import RailLine
 from ..raster import TILE, RailRaster, cell_size, rasterize
-from ..standards import distinct_gauges
-from ..tracks.centerlines import CenterlineParameters, build_centerlines
 from ..tracks.parallels import widths_by_gauge
 from ..vectorize import vectorize
 from .grid import HALO_M, OVERLAP_M, Key, PointSource, Square, mosaic, own_tiles
@@ -149,7 +145,7 @@ def whole_rails(
         Receives a warning if lines had to be cut.
     """
     rails = [rail for rail in join(results, frame) if rail.length_m >= parameters.min_length_m]
-    return _finished(numbered(rails), parameters, first_id, progress)
+    return _numbered(numbered(rails), parameters, first_id, progress)
 
 
 def lines_of(
@@ -174,7 +170,7 @@ def lines_of(
         `rail_id` of the first rail.
     """
     drawn, _ = _all_vertices(raster, class_code, points, parameters, progress)
-    return _finished(drawn, parameters, first_id, progress)
+    return _numbered(drawn, parameters, first_id, progress)
 
 
 def _all_vertices(
@@ -247,82 +243,7 @@ def measure_lines(
     return rails, rows_of(network.lines, strips)
 
 
-def _finished(rails: Sequence[RailLine], parameters: Parameters, first_id: int, progress: Progress) -> list[RailLine]:
-    """Cut turns too sharp for a rail, simplify rails and number them from `first_id`."""
-    thinned = thin(_without_turns(rails, parameters, progress), parameters.simplify_xy_m, parameters.simplify_z_m)
-    return [replace(rail, rail_id=number) for number, rail in enumerate(thinned, start=first_id)]
-
-
-Line = TypeVar("Line", RailLine, Centerline)
-
-
-def _without_turns(lines: Sequence[Line], parameters: Parameters, progress: Progress) -> list[Line]:
-    """Split lines where they turn too sharply for rails, and warn the user."""
-    kept: list[Line] = []
-    turned: list[Line] = []
-    for line in lines:
-        parts = parts_without_turns(line.xyz[:, :2], parameters.min_length_m, parameters.smoothing_xy_m)
-        whole = len(parts) == 1 and np.ptp(parts[0]) >= length_along(line.xyz[:, :2])[-1]
-        kept += [line] if whole else [line.part(*part) for part in parts]
-        turned += [] if whole else [line]
-    if turned:
-        what = "rail" if isinstance(turned[0], RailLine) else "centerline"
-        count, was = (f"1 {what} bends", "it was") if len(turned) == 1 else (f"{len(turned)} {what}s bend", "they were")
-        before_m, after_m = (sum(line.length_m for line in some) for some in (lines, kept))
-        progress.warning(
-            f"{count} by more than {MAX_TURN_DEG:g}° within a metre, which rails cannot; {was} split there and "
-            f"{before_m - after_m:.1f} m dropped."
-        )
-    return kept
-
-
-def tracks_of(rails: Sequence[RailLine], parameters: Parameters, progress: Progress = SILENT) -> list[Centerline]:
-    """Pair the rails of each class at every gauge, and draw, simplify and number the centerlines.
-
-    Takes the rails as the user gets them, so that rails from a file give the same tracks.
-
-    Raises
-    ------
-    NoTrackError
-        Rails run parallel, but in no class at one of the gauges. If that is true of some classes only, the user is
-        warned instead.
-    """
-    codes = sorted({rail.class_code for rail in rails})
-    centerlines: list[Centerline] = []
-    errors: dict[int, NoTrackError] = {}
-    for code, share in zip(codes, progress.split(len(codes))):
-        try:
-            centerlines += tracks_of_class([rail for rail in rails if rail.class_code == code], parameters, share)
-        except NoTrackError as error:
-            errors[code] = error
-    if errors and not centerlines:
-        raise next(iter(errors.values()))
-    for code, without_track in errors.items():
-        progress.warning(f"Class {code}: {without_track}")
-    return [replace(line, track_id=number) for number, line in enumerate(centerlines, start=1)]
-
-
-def tracks_of_class(rails: Sequence[RailLine], parameters: Parameters, progress: Progress) -> tuple[Centerline, ...]:
-    """Pair the rails of one class; see `tracks_of`."""
-    settings = CenterlineParameters(
-        tolerance_m=parameters.centerline_tolerance_m,
-        max_gap_m=parameters.max_gap_m,
-        smoothing_m=parameters.smoothing_xy_m,
-        min_length_m=parameters.min_length_m,
-    )
-    distinct = distinct_gauges(parameters.gauges_m, parameters.centerline_tolerance_m)
-    gauges = [(gauge_m, dict(parameters.gauges)[gauge_m]) for gauge_m in distinct]
-    centerlines: list[Centerline] = []
-    errors: list[NoTrackError] = []
-    for one, step in zip(gauges, progress.split(len(gauges))):
-        settings = replace(settings, other_spacings_m=tuple(sum(other) for other in gauges if other != one))
-        try:
-            centerlines += build_centerlines(rails, *one, settings, step)
-        except NoTrackError as error:
-            errors.append(error)
-    if errors and not centerlines:
-        raise errors[0]
-    if not centerlines:
-        progress.warning("No two rails run parallel: there are rails but no track centerlines.")
-    whole = _without_turns(centerlines, parameters, progress)
-    return thin(whole, parameters.simplify_xy_m, parameters.simplify_z_m)
+def _numbered(rails: Sequence[RailLine], parameters: Parameters, first_id: int, progress: Progress) -> list[RailLine]:
+    """Finish rails and number them from `first_id`."""
+    whole = finished(rails, parameters, progress)
+    return [replace(rail, rail_id=number) for number, rail in enumerate(whole, start=first_id)]

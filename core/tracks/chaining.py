@@ -52,17 +52,10 @@ class _Ends:
     def of(
         cls, rails: Sequence[RailLine], pairs: Sequence[RailPair], reach_m: float, linked: set[tuple[int, int]]
     ) -> _Ends:
-        """List the ends of all sections, in order, and then the ends of rails beyond sections.
+        """List the ends of all sections, in order, and then the ends of rails up to `reach_m` beyond sections.
 
-        Parameters
-        ----------
-        rails : sequence of RailLine
-        pairs : sequence of RailPair
-        reach_m : float
-            Length over which a rail is followed beyond its section.
-        linked : set of tuple of int
-            Ends of sections, with the number of the rail, from which the rail leads to another section; these rails are
-            not followed.
+        From the ends that are `linked`, given with the number of the rail, the rail leads to another section; there it
+        is not followed.
         """
         own, farther = [], []
         for end in range(2 * len(pairs)):
@@ -258,15 +251,7 @@ class RailAhead:
 
     @classmethod
     def of(cls, rail: RailLine, span: tuple[float, float], end: int) -> RailAhead:
-        """Return a rail seen from the start (`end` 0) or from the end (1) of a section.
-
-        Parameters
-        ----------
-        rail : RailLine
-        span : tuple of float
-            Chainages of the section's start and end along the rail.
-        end : int
-        """
+        """Return a rail seen from the start (`end` 0) or from the end (1) of a section, given by its chainages."""
         line = rail.xyz[:, :2]
         return cls(line, length_along(line), span[end], 1 if span[end] > span[1 - end] else -1)
 
@@ -276,14 +261,9 @@ class RailAhead:
         return float(self.along[-1] - self.end_m if self.sense > 0 else self.end_m)
 
     def at(self, ahead_m: np.ndarray, left_m: float = 0.0) -> np.ndarray:
-        """Return places along the rail, (n, 2).
+        """Return places along the rail, (n, 2), beyond the end of the section, and offset to the left as seen outwards.
 
-        Parameters
-        ----------
-        ahead_m : (n,) array
-            Distances beyond the end of the section; negative ones are inside it.
-        left_m : float
-            Offset from the rail, to the left as seen outwards.
+        Negative distances are inside the section.
         """
         places = interpolate(self.line, self.along, self.end_m + self.sense * ahead_m)
         return places + left_m * left_normals(places) if left_m else places
@@ -298,12 +278,6 @@ def rails_ahead(rails: Sequence[RailLine], pair: RailPair, end: int) -> tuple[Ra
 
 
 def runs_on(span: tuple[float, float], following: tuple[float, float]) -> bool:
-    """Return whether a rail leads forwards from one section to the following one.
-
-    Parameters
-    ----------
-    span, following : tuple of float
-        Chainages of start and end of both sections along the rail.
-    """
+    """Return whether a rail leads forwards from one section to the following one, both given by chainages along it."""
     sense = span[1] - span[0]
     return sense * (following[1] - following[0]) > 0 and sense * (following[1] - span[1]) > 0

@@ -92,13 +92,7 @@ def match_polylines(first: np.ndarray, second: np.ndarray, tolerance: float) -> 
 
 
 def lattice_edges(first: np.ndarray, second: np.ndarray, tolerance: float) -> Edges:
-    """Pair every vertex with every segment of the other polyline that is closer than the tolerance.
-
-    Parameters
-    ----------
-    first, second : (m, 2), (n, 2) arrays
-    tolerance : float
-    """
+    """Pair every vertex with every segment of the other polyline that is closer than the tolerance."""
     ahead, turned = _near_pairs(first, second, tolerance), _near_pairs(second, first, tolerance)
     turned = (turned[1], turned[0], *turned[2:])
     kind = np.repeat([ADVANCE_SECOND, ADVANCE_FIRST], [len(ahead[0]), len(turned[0])])

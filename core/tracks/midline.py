@@ -22,20 +22,9 @@ PROVISIONAL_STEP_M = 0.25
 
 
 def provisional_centerline(rails: Sequence[RailLine], chain: Chain, half_m: float, reach_m: float) -> np.ndarray:
-    """Draw a line half a spacing from a rail of the track, and straight where there is no rail.
+    """Draw a line, (n, 2), half a spacing from a rail of the track, and straight where there is no rail.
 
-    Parameters
-    ----------
-    rails : sequence of RailLine
-    chain : Chain
-    half_m : float
-        Half the distance between the rail lines.
-    reach_m : float
-        Length over which a rail that does not reach the next section is followed.
-
-    Returns
-    -------
-    (n, 2) array
+    A rail that does not reach the next section is followed for `reach_m` at most.
     """
     left, right = rails_ahead(rails, chain.pairs[-1], 1)
     back_left, back_right = rails_ahead(rails, chain.pairs[0], 0)
@@ -129,11 +118,6 @@ class Meeting:
     rail: np.ndarray
     t: np.ndarray
     paired: np.ndarray
-
-    @classmethod
-    def joined(cls, parts: Sequence[Meeting]) -> Meeting:
-        """Concatenate meetings."""
-        return cls(*(np.concatenate(columns) for columns in zip(*(vars(part).values() for part in parts))))
 
     def without(self, which: np.ndarray) -> Meeting:
         """Remove the rails met at the stations marked in `which`, (n,) bool."""
@@ -233,38 +217,19 @@ class Side:
 
 
 def at_gauge(left: Meeting, right: Meeting, spacing_m: float, tolerance_m: float) -> tuple[Meeting, Meeting]:
-    """Remove rails outside their sections where they do not keep the distance to the other rail.
+    """Remove rails outside their sections where they do not keep the distance to the other rail within the tolerance.
 
     A stock rail that continues into the branch, for example, soon leaves the through track.
-
-    Parameters
-    ----------
-    left, right : Meeting
-    spacing_m : float
-        Distance between the rail lines.
-    tolerance_m : float
-        Maximum deviation from it.
     """
     astray = np.abs(left.distance_m + right.distance_m - spacing_m) > tolerance_m
     return left.without(astray & ~left.paired), right.without(astray & ~right.paired)
 
 
 def midway(stations: np.ndarray, normals: np.ndarray, left: Meeting, right: Meeting) -> np.ndarray:
-    """Find the middle between both rails at stations.
+    """Find the middle, (k, 3), between both rails at stations, (n, 2), with unit vectors to the left.
 
     Where one rail is missing, the middle is half the median spacing from the other; stations without any rail are left
-    out.
-
-    Parameters
-    ----------
-    stations, normals : (n, 2) arrays
-        Stations between the rails and unit vectors to the left.
-    left, right : Meeting
-        At least one station meets both rails.
-
-    Returns
-    -------
-    (k, 3) array
+    out. At least one station meets both rails.
     """
     to_left, to_right = left.distance_m, right.distance_m
     both = to_left + to_right
@@ -282,21 +247,7 @@ def _heights(left: np.ndarray, right: np.ndarray) -> np.ndarray:
 
 
 def bridged_steps(rails: Sequence[RailLine], left: Meeting, right: Meeting, along: np.ndarray) -> np.ndarray:
-    """Measure the length, between successive stations, over which a rail is missing or has no points.
-
-    Parameters
-    ----------
-    rails : sequence of RailLine
-        The rails to which the numbers in the meetings refer.
-    left, right : Meeting
-    along : (n,) array
-        Chainage of the stations.
-
-    Returns
-    -------
-    (n - 1,) array
-        Metres.
-    """
+    """Measure the length, (n - 1,) metres, between successive stations on which a rail is missing or has no points."""
     steps = np.diff(along)
     return np.maximum(_bridged_on(rails, left, steps), _bridged_on(rails, right, steps))
 

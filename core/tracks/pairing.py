@@ -92,9 +92,7 @@ class RailPair:
 
 def pair_rails(
     rails: Sequence[RailLine],
-    gauge_m: float,
-    head_width_m: float,
-    tolerance_m: float = Parameters.centerline_tolerance_m,
+    parameters: Parameters,
     other_spacings_m: Sequence[float] = (),
     progress: Progress = SILENT,
 ) -> tuple[RailPair, ...]:
@@ -106,10 +104,8 @@ def pair_rails(
     Parameters
     ----------
     rails : sequence of RailLine
-    gauge_m, head_width_m : float
-        Their sum is the distance between the rail lines.
-    tolerance_m : float
-        Maximum deviation from that distance.
+    parameters : Parameters
+        The gauge and the width of the heads together are the distance between the rail lines.
     other_spacings_m : sequence of float
         Distances at which rails are paired for other gauges: a match that is closer to one of them is left to it.
     progress : Progress
@@ -121,12 +117,13 @@ def pair_rails(
     """
     if len(rails) < 2:
         return ()
-    spacing = gauge_m + head_width_m
-    reach_m = max(MAX_SPACING_M, spacing + 2 * tolerance_m)
-    parallels = find_parallels(rails, reach_m, progress.span(0.0, 0.3))
-    candidates = find_candidates(parallels, spacing, tolerance_m)
+    spacing, tolerance_m = parameters.gauge_m + parameters.head_width_m, parameters.centerline_tolerance_m
+    parallels = find_parallels(rails, max(MAX_SPACING_M, spacing + 2 * tolerance_m), progress.span(0.0, 0.3))
     matches: list[_Match] = []
-    for section in progress.span(0.3, 1.0).follow(candidates):
+    # Chords between stations, and stations that are not exactly abreast, distort the distance a little.
+    near = parallels[np.abs(np.abs(parallels.left_m) - spacing) < 2 * tolerance_m]
+    sections = [section for group in near.groups() for section in _sections(group)]
+    for section in progress.span(0.3, 1.0).follow(sections):
         found = _match(rails, section, spacing, tolerance_m)
         matches.extend(match for match in found if _is_nearest(match, section, spacing, other_spacings_m))
     # What wanders goes first: it would make the track next to it look like a ghost.
@@ -134,29 +131,6 @@ def pair_rails(
     steady = _without_rivals(selected, [_misfit_m(rails, match, spacing)[1] for match in selected])
     sure = _without_ghosts(steady)
     return tuple(match.pair() for match in _without_rivals(sure, [sum(_misfit_m(rails, m, spacing)) for m in sure]))
-
-
-def find_candidates(parallels: Parallels, spacing_m: float, tolerance_m: float) -> list[Parallels]:
-    """Find the sections of rails that may be at gauge, for the exact matching.
-
-    Chords between stations, and stations that are not exactly abreast, distort the distance a little. Distances are
-    therefore compared with twice the tolerance.
-
-    Parameters
-    ----------
-    parallels : Parallels
-    spacing_m : float
-        Distance between the rail lines at gauge.
-    tolerance_m : float
-        Maximum deviation of a match from that distance.
-
-    Returns
-    -------
-    list of Parallels
-        The stations of each section.
-    """
-    near = parallels[np.abs(np.abs(parallels.left_m) - spacing_m) < 2 * tolerance_m]
-    return [section for group in near.groups() for section in _sections(group)]
 
 
 @dataclass(frozen=True)
@@ -286,7 +260,7 @@ def _select(matches: Sequence[_Match]) -> list[_Match]:
     used = _PairedSides()
     selected = []
     for match in sorted(matches, key=lambda match: (-match.length_m, match.mean_penalty)):
-        for part in _free_runs(match, used.same_side_a(match) | used.same_side_b(match)):
+        for part in _free_runs(match, used.same_side(match)):
             used.add(part)
             selected.append(part)
     return selected
@@ -301,9 +275,9 @@ def _without_ghosts(matches: Sequence[_Match]) -> list[_Match]:
     """
     while True:
         partners = _PairedSides(matches)
-        doubtful = [partners.far_side_a(match) & partners.far_side_b(match) for match in matches]
+        doubtful = [np.all(partners.far_side(match), axis=0) for match in matches]
         sure = _PairedSides(part for match, out in zip(matches, doubtful) for part in _free_runs(match, out))
-        ghosts = [out & (sure.far_side_a(match) | sure.far_side_b(match)) for match, out in zip(matches, doubtful)]
+        ghosts = [out & np.any(sure.far_side(match), axis=0) for match, out in zip(matches, doubtful)]
         if not any(ghost.any() for ghost in ghosts):
             return list(matches)
         matches = [part for match, ghost in zip(matches, ghosts) for part in _free_runs(match, ghost)]
@@ -352,7 +326,7 @@ def _without_rivals(matches: Sequence[_Match], misfits_m: Sequence[float]) -> li
             for other, other_m in zip(matches, misfits_m)
             if misfit_m > CLEARLY_WORSE * other_m and misfit_m > other_m + CLEARLY_WORSE_M
         )
-        lost = better.far_side_a(match) | better.far_side_b(match)
+        lost = np.any(better.far_side(match), axis=0)
         if np.mean(lost) <= MAX_LOST_SHARE:
             kept += _free_runs(match, lost)
     return kept
@@ -371,21 +345,17 @@ class _PairedSides:
         self._used[match.a, match.side_a].append(tuple(np.sort(match.t_a[[0, -1]])))
         self._used[match.b, match.side_b].append(tuple(np.sort(match.t_b[[0, -1]])))
 
-    def same_side_a(self, match: _Match) -> np.ndarray:
-        """Return the nodes of a match at which its first rail has a partner on the side of the match, (n,) bool."""
-        return _inside(match.t_a, self._used[match.a, match.side_a])
+    def same_side(self, match: _Match) -> np.ndarray:
+        """Return the nodes of a match at which one of its rails has a partner on the side of the match, (n,) bool."""
+        return np.any(self._of(match, 1), axis=0)
 
-    def same_side_b(self, match: _Match) -> np.ndarray:
-        """Return the same for the second rail."""
-        return _inside(match.t_b, self._used[match.b, match.side_b])
+    def far_side(self, match: _Match) -> np.ndarray:
+        """Return the nodes of a match at which its first and its second rail has one on the other side, (2, n) bool."""
+        return self._of(match, -1)
 
-    def far_side_a(self, match: _Match) -> np.ndarray:
-        """Return the nodes at which the first rail has a partner on its other side, (n,) bool."""
-        return _inside(match.t_a, self._used[match.a, -match.side_a])
-
-    def far_side_b(self, match: _Match) -> np.ndarray:
-        """Return the same for the second rail."""
-        return _inside(match.t_b, self._used[match.b, -match.side_b])
+    def _of(self, match: _Match, sense: int) -> np.ndarray:
+        sides = ((match.t_a, match.a, match.side_a), (match.t_b, match.b, match.side_b))
+        return np.array([_inside(t, self._used[rail, sense * side]) for t, rail, side in sides])
 
 
 def _inside(t: np.ndarray, intervals: Sequence[tuple[float, float]]) -> np.ndarray:

@@ -12,8 +12,7 @@ from ..lines.network import LineNetwork
 from ..parameters import Parameters
 from ..progress import SILENT, Progress
 from ..raster import RailRaster
-from .attaching import attach_branches
-from .branches import choose_routes, free_third_rails, resolve_branches
+from .branches import attach_branches, choose_routes, part_branches
 from .crossings import resolve_crossings
 from .joining import join_gaps
 from .junctions import clean_junctions, cut_kinks, run_through, weld_pairs
@@ -71,11 +70,10 @@ def vectorize(
     seen = cKDTree(closed.to_local(pixels.cells / 2))
     network, slips = open_slips(clean_junctions(traced, head_width_m), seen)
     network = cut_kinks(network, progress.span(0.6, 0.85))
-    network = resolve_branches(free_third_rails(add_curves(resolve_crossings(network), slips)))
-    network = join_gaps(run_through(network), max_gap_m, gap_angle_deg, seen, progress=progress)
+    network = part_branches(add_curves(resolve_crossings(network), slips))
+    network = join_gaps(run_through(network), seen, max_gap_m, gap_angle_deg, progress)
     network = attach_branches(network, seen, max_gap_m, progress.span(0.9, 1.0))
-    network = choose_routes(_drop_short(network, min_length_m))
-    return _settle_ends(network)
+    return _settle_ends(choose_routes(_drop_short(network, min_length_m)))
 
 
 def _drop_short(network: LineNetwork, min_length_m: float) -> LineNetwork:

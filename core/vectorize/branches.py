@@ -1,19 +1,34 @@
-"""Where one rail leaves another, the raster shows their mean; both are redrawn from where they part.
+"""Where one rail leaves another, the raster shows their mean: the one runs on, and the other is led to it by a curve.
 
-See docs/method.md section 4.11.
+See docs/method.md sections 4.11 and 4.12.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from itertools import combinations
 
 import numpy as np
+from scipy.spatial import cKDTree
 
-from ..lines.ends import ARC, MISFIT_M, STEP_M, PartingLaw, bridge, cut_back, even_points, turned
+from ..lines.ends import (
+    ARC,
+    FIT_M,
+    MISFIT_M,
+    STEP_M,
+    Bridge,
+    PartingLaw,
+    bridge,
+    cut_back,
+    even_points,
+    tip_and_direction,
+)
 from ..lines.network import LineNetwork
 from ..polyline import length_along
+from ..progress import SILENT, Progress
 from .crossings import MISFIT_M as KNOWN_MISFIT_M
 from .crossings import SKIP_M
+from .joining import unseen_m
 from .junctions import DEFLECTION_DEG, DIRECTION_M, deflections, ends_by_node, unsteadiness
 
 MAX_BACK_M = 40.0
@@ -23,93 +38,78 @@ after 32 m, and the visible part gives that length to within a quarter."""
 STEADY_M = 8.0
 """Length over which the parting of two rails is measured."""
 
-MERGED_M, MIN_LEG_M = 8.0, 8.0
-"""Length of the stem of three rails in which they are merged, and shortest leg that shows which of them goes on: rails
-that part on 190 m have separate heads after 7.5 m."""
-
 ROUTE_M = 40.0
 """Length on either side over which curvatures are compared. At 1:26.5, the flattest turnout in use, the branch is then
 off a constant curvature by 18 mm, several times the uncertainty from stairs; over 30 m, by 10 mm."""
 
-MIN_LENGTH_M = 8.0
-"""Shorter parts between nodes have no measurable curvature."""
+MAX_BESIDE_M = 1.0
+"""A branch that ends further from a rail is not connected to it: nothing of the switch has been seen."""
+
+MIN_AHEAD_M = 4.0
+"""Shortest length of a stock rail beyond the end of its branch, where the branch is to be connected."""
+
+MIN_POINTS = 10
+"""Fewer even points, on a metre of line, have no measurable curvature."""
 
 
-def resolve_branches(network: LineNetwork) -> LineNetwork:
-    """Draw both rails of every branching as smooth curves from their common stem.
+def part_branches(network: LineNetwork) -> LineNetwork:
+    """Let the stem of every branching run on into its steadiest leg, and the other legs end freely.
 
-    Which of them continues the stem is left open.
+    `attach_branches` leads these back. Where three rails part within a few metres, a line too short for its direction
+    to be measured connects two branchings, which are taken as one.
 
     Parameters
     ----------
     network : LineNetwork
         Lines without passes.
-
-    Returns
-    -------
-    LineNetwork
-        Nodes of three lines, one of which continues in both others, are where these two begin to part.
     """
-    lines, nodes = list(network.lines), network.nodes.copy()
-    for node, stem, legs in branchings(network):
-        trunk, *rails = (turned(lines[end // 2], end) for end in (stem, *legs))
-        if min(length_along(rail)[-1] for rail in rails) < SKIP_M + DIRECTION_M:
-            continue
-        trunk = _trunk(trunk, rails)
-        drawn = [_drawn(trunk, rail) for rail in rails] if len(trunk) > 1 else [None]
-        redrawn = [line for line in drawn if line is not None]
-        if len(redrawn) < len(drawn):
-            continue
-        nodes[node] = trunk[0]
-        lines[stem // 2] = turned(trunk, stem)
-        for leg, line in zip(legs, redrawn):
-            lines[leg // 2] = turned(line, leg)
-    return LineNetwork(tuple(lines), nodes, network.ends, network.passes)
+    legs_of = {stem: legs for _, stem, legs in branchings(network)}
+    short = network.lengths() < SKIP_M + DIRECTION_M
+    joins: dict[tuple[int, int], Bridge] = {}
+    cuts_m: dict[int, float] = {}
+    links: list[int] = []
+    for stem, legs in legs_of.items():
+        ways = {leg: network.from_end(leg) for leg in legs}
+        through = [leg for leg in legs if short[leg // 2] and leg ^ 1 in legs_of]
+        for link in through:
+            before = ways.pop(link)
+            ways.update({leg: np.concatenate([before[:-1], network.from_end(leg)]) for leg in legs_of[link ^ 1]})
+        found = _run_on(network, stem, ways, cuts_m)
+        if found is not None:
+            back_m, steady, curve = found
+            joins[stem, steady] = curve
+            cuts_m.update({**dict.fromkeys(ways, SKIP_M), stem: back_m})
+            links += [link // 2 for link in through]
+    return network.bridged(joins, cuts_m, links)
 
 
-def free_third_rails(network: LineNetwork) -> LineNetwork:
-    """Where three rails part within a few metres, draw the one that goes on straight, and let the others end freely.
+def _run_on(
+    network: LineNetwork, stem: int, ways: Mapping[int, np.ndarray], cuts_m: Mapping[int, float]
+) -> tuple[float, int, Bridge] | None:
+    """Find how far back a stem is merged, the leg in which it continues, and the curve; None if no rail could run so.
 
-    A short line then connects two branchings, too short for its direction to be measured; `attach_branches` leads the
-    free rails back to the one that goes on.
+    Given are the ways from the stem on into its legs, and what has been cut off other ends.
     """
-    freed = True
-    while freed:
-        freed = False
-        stems = {node: (stem, legs) for node, stem, legs in branchings(network)}
-        for link in np.flatnonzero(network.lengths() < SKIP_M + DIRECTION_M).tolist():
-            for near, far in ((0, 1), (1, 0)):
-                first, second = (stems.get(int(network.ends[link, side])) for side in (near, far))
-                if first is None or second is None or second[0] != 2 * link + far or 2 * link + near not in first[1]:
-                    continue
-                legs = [leg for leg in first[1] if leg != 2 * link + near] + second[1]
-                drawn = _third_freed(network, first[0], link, legs)
-                if drawn is not None:
-                    network, freed = drawn, True
-                    break
-            if freed:
-                break
-    return network
-
-
-def _third_freed(network: LineNetwork, stem: int, link: int, legs: list[int]) -> LineNetwork | None:
-    """Join a stem with the steadiest of three legs, and free the others; None if no rail could go on so."""
-    trunk = network.from_end(stem)
-    rails = {leg: cut_back(network.from_end(leg), SKIP_M) for leg in legs if network.lengths()[leg // 2] > MIN_LEG_M}
-    if len(rails) < len(legs) or len({end // 2 for end in (stem, link * 2, *legs)}) < 5:
+    lengths = network.lengths()
+    left_m = {end: lengths[end // 2] - cuts_m.get(end ^ 1, 0.0) for end in (stem, *ways)}
+    if len({end // 2 for end in left_m}) < len(left_m) or min(left_m[leg] for leg in ways) < SKIP_M + DIRECTION_M:
         return None
-    if length_along(trunk)[-1] < MERGED_M + MIN_LEG_M:
+    back_m = max(_merged_m(one, other) for one, other in combinations(ways.values(), 2))
+    if not 0 < back_m < min(MAX_BACK_M, left_m[stem] - DIRECTION_M):
         return None
-    trunk = cut_back(trunk, MERGED_M)
-    steady = min(legs, key=lambda leg: unsteadiness(trunk, rails[leg], MIN_LEG_M))
+    trunk = cut_back(network.from_end(stem), back_m)
+    rails = {leg: cut_back(network.from_end(leg), SKIP_M) for leg in ways}
+    steady = min(rails, key=lambda leg: unsteadiness(trunk, rails[leg], ROUTE_M))
     curve = bridge(trunk, rails[steady], misfit_m=KNOWN_MISFIT_M)
-    if curve is None:
-        return None
-    cuts_m = dict.fromkeys(legs, SKIP_M) | {stem: MERGED_M + curve.cuts_m[0], steady: SKIP_M + curve.cuts_m[1]}
-    keep = np.arange(len(network.lines)) != link
-    one, other = (end - 2 * (end // 2 > link) for end in (stem, steady))
-    points = {one: curve.points, other: curve.points[::-1]}
-    return network.cut_back(cuts_m).select(keep).weld({one: other, other: one}, points)
+    return None if curve is None else (back_m, steady, curve)
+
+
+def _merged_m(one: np.ndarray, other: np.ndarray) -> float:
+    """Measure how far before their node two legs begin to part; not positive if they do not."""
+    one, other = (even_points(cut_back(way, SKIP_M), STEADY_M) for way in (one, other))
+    count = min(len(one), len(other))
+    apart_m = np.hypot(*(one[:count] - other[:count]).T)
+    return -PartingLaw.fitted(SKIP_M + STEP_M * np.arange(count), apart_m, ARC).way_at(MISFIT_M)
 
 
 def branchings(network: LineNetwork) -> Iterator[tuple[int, int, list[int]]]:
@@ -122,35 +122,73 @@ def branchings(network: LineNetwork) -> Iterator[tuple[int, int, list[int]]]:
                 yield node, ends[stem], ends[:stem] + ends[stem + 1 :]
 
 
-def _trunk(stem: np.ndarray, rails: list[np.ndarray]) -> np.ndarray:
-    """Cut the stem back to where the legs begin to part; no vertices if that is too far or the stem too short."""
-    one, other = (even_points(cut_back(rail, SKIP_M), STEADY_M) for rail in rails)
-    count = min(len(one), len(other))
-    apart_m = np.hypot(*(one[:count] - other[:count]).T)
-    law = PartingLaw.fitted(SKIP_M + STEP_M * np.arange(count), apart_m, ARC)
-    back_m = -law.way_at(MISFIT_M)
-    too_short = length_along(stem)[-1] < back_m + DIRECTION_M
-    if too_short or not 0 < back_m < MAX_BACK_M:
-        return stem[:0]
-    return cut_back(stem, back_m)
+def attach_branches(network: LineNetwork, seen: cKDTree, max_gap_m: float, progress: Progress = SILENT) -> LineNetwork:
+    """Extend free ends to the rails from which they branch off, by curves that explain both lines.
+
+    Parameters
+    ----------
+    network : LineNetwork
+    seen : cKDTree
+        Places of rail cells.
+    max_gap_m : float
+        Largest length of the curve away from all cells.
+    progress : Progress
+    """
+    if not network.lines:
+        return network
+    low = np.array([line.min(axis=0) for line in network.lines]) - MAX_BESIDE_M
+    high = np.array([line.max(axis=0) for line in network.lines]) + MAX_BESIDE_M
+    for end in progress.follow(np.flatnonzero(network.degrees()[network.ends.ravel()] == 1).tolist()):
+        from_end = network.from_end(end)
+        if length_along(from_end)[-1] < FIT_M:
+            continue
+        near = np.flatnonzero(((from_end[0] > low) & (from_end[0] < high)).all(axis=1))
+        touches = [
+            (touch[1].cost, number, *touch)
+            for number in near.tolist()
+            if number != end // 2 and (touch := _touch(from_end, network.lines[number])) is not None
+            if unseen_m(touch[1].points, seen) <= max_gap_m
+        ]
+        if touches:
+            _, number, vertex, curve = min(touches, key=lambda touch: touch[0])
+            network = network.cut_back({end: curve.cuts_m[0]})
+            network = network.with_end(end, curve.points[::-1], 0, at=(number, vertex))
+    return network.tidy()
 
 
-def _drawn(trunk: np.ndarray, rail: np.ndarray) -> np.ndarray | None:
-    """Draw a leg from the end of the stem on, by a bridge to its free part; None if there is no bridge."""
-    free = cut_back(rail, SKIP_M)
-    curve = bridge(trunk, free, held=True, misfit_m=KNOWN_MISFIT_M)
+def _touch(from_end: np.ndarray, line: np.ndarray) -> tuple[int, Bridge] | None:
+    """Find the vertex of a line from which another one, given from its end inward, branches off, and the curve."""
+    tip, outward = tip_and_direction(even_points(from_end, DIRECTION_M))
+    axes = np.array([outward, [-outward[1], outward[0]]])
+    x, y = axes @ (line - tip).T
+    near = np.flatnonzero((x > -STEADY_M) & (x < MAX_BACK_M + MIN_AHEAD_M) & (np.abs(y) < MAX_BESIDE_M))
+    if len(near) < 2:
+        return None
+    way = np.arange(near[0], near[-1] + 1)[:: 1 if x[near[-1]] > x[near[0]] else -1]
+    x, y = x[way], y[way]
+    if x[0] > 0 or x[-1] < MIN_AHEAD_M or (np.diff(x) < -STEP_M).any():
+        return None
+    own_x, own_y = axes @ (even_points(from_end, min(STEADY_M, -x[0])) - tip).T
+    apart_m = np.interp(own_x, np.maximum.accumulate(x), y) - own_y
+    if len(own_x) < MIN_POINTS or len(set(np.sign(apart_m))) > 1:
+        return None
+    touch_m = -PartingLaw.fitted(-own_x, np.abs(apart_m), ARC).way_at(MISFIT_M)
+    if not 0 < touch_m < min(MAX_BACK_M, x[-1]):
+        return None
+    onward = way[int(np.abs(x - touch_m).argmin())]
+    stock = line[onward:] if way[0] < way[-1] else line[onward::-1]
+    curve = bridge(from_end, stock) if length_along(stock)[-1] >= DIRECTION_M else None
     if curve is None:
         return None
-    return np.concatenate([trunk[:1], curve.points, cut_back(free, curve.cuts_m[1])])
+    further = int(np.searchsorted(length_along(stock), curve.cuts_m[1]))
+    vertex = int(onward + further if way[0] < way[-1] else onward - further)
+    return (vertex, curve) if 0 < vertex < len(line) - 1 else None
 
 
 def choose_routes(network: LineNetwork) -> LineNetwork:
     """Let the rail whose curvature changes least pass through each node in which one rail leaves another."""
     pieces, partner = network.parted()
-    lengths = pieces.lengths()
     for _, stem, legs in branchings(pieces):
-        if min(lengths[end // 2] for end in (stem, *legs)) < MIN_LENGTH_M:
-            continue
         scores = [unsteadiness(pieces.from_end(stem), pieces.from_end(leg), ROUTE_M) for leg in legs]
         steady = legs[scores.index(min(scores))]
         for end in (stem, *legs):

@@ -44,28 +44,16 @@ def resolve_crossings(network: LineNetwork) -> LineNetwork:
     network : LineNetwork
         Lines without passes.
     """
-    keep = np.ones(len(network.lines), dtype=bool)
     joins: dict[tuple[int, int], Bridge] = {}
     cuts_m: dict[int, float] = {}
+    dropped: list[int] = []
     for shared, legs in _crossings(network):
         pairing = _best_pairing(network, legs)
-        if not pairing or any(end in cuts_m for end in legs):
-            continue
-        joins.update(pairing)
-        keep[shared] = False
-        for ends, found in pairing.items():
-            for end, more_m in zip(ends, found.cuts_m):
-                cuts_m[end] = legs[end] + more_m
-    if not joins:
-        return network
-    number = np.cumsum(keep) - 1
-    partner: dict[int, int] = {}
-    bridges: dict[int, np.ndarray] = {}
-    for (one, other), found in joins.items():
-        one, other = (2 * int(number[end // 2]) + end % 2 for end in (one, other))
-        partner[one], partner[other] = other, one
-        bridges[one], bridges[other] = found.points, found.points[::-1]
-    return network.cut_back(cuts_m).select(keep).weld(partner, bridges)
+        if pairing and not any(end in cuts_m for end in legs):
+            joins.update(pairing)
+            cuts_m.update(legs)
+            dropped += shared
+    return network.bridged(joins, cuts_m, dropped)
 
 
 def _crossings(network: LineNetwork) -> Iterator[tuple[list[int], dict[int, float]]]:

@@ -1,4 +1,4 @@
-"""Repair what the raster does to junctions: drop spurs, bubbles, rungs and kinks, and run rails through nodes.
+"""Repair what the raster does to junctions: drop spurs, rungs and kinks, and run rails through nodes.
 
 See docs/method.md section 4.6.
 """
@@ -8,9 +8,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from ..lines.ends import STEP_M, even_points, tip_and_direction
+from ..lines.finishing import parts_without_turns
 from ..lines.network import LineNetwork
 from ..polyline import length_along, part
 from ..progress import SILENT, Progress
@@ -21,13 +21,6 @@ SPUR_M = 1.0
 RUNG_HEADS = 3.0
 RUNG_DEG = 30.0
 """A shorter and steeper line between two rails is a rung: cells across the flangeway."""
-
-BUBBLE_M = 1.0
-"""A loop with shorter sides is a hole in a blot, not two rails."""
-
-SLIT_M = 10.0
-"""Loops up to this length are slits that noise has bridged twice, if their sides are at most a rung apart. Rails that
-part on a radius of 2500 m have separate heads after 23 m, and after 33 m they are too far apart for a rung."""
 
 DEFLECTION_DEG = 15.0
 """A rail turns by less where it passes through a node; the steepest turnouts in use leave at about 14 degrees."""
@@ -41,17 +34,14 @@ DIRECTION_M = 2.5
 COARSE_M = 1.0
 """Spacing of the points that are compared: directions between closer ones show the stairs."""
 
-TOGETHER_M = 1.0
-"""Kinks closer to each other than this are one."""
-
-KINK_DEG, KINK_M = 25.0, 0.5
-"""No rail turns by this angle between two parts of this length; the stairs of a raster turn by 6 degrees."""
+KINK_DEG, KINK_STEP_M = 25.0, 0.5
+"""No rail turns by this angle within a metre, measured between stations this far apart; the stairs of a raster turn by
+6 degrees."""
 
 
 def clean_junctions(network: LineNetwork, head_width_m: float) -> LineNetwork:
-    """Drop spurs, small loops and rungs between rails, and join lines at nodes of degree 2."""
-    network = weld_pairs(drop_bubbles(weld_pairs(network), RUNG_HEADS * head_width_m))
-    network = weld_pairs(drop_rungs(network, RUNG_HEADS * head_width_m))
+    """Drop spurs and rungs between rails, and join lines at nodes of degree 2."""
+    network = weld_pairs(drop_rungs(weld_pairs(network), RUNG_HEADS * head_width_m))
     return drop_spurs(network, SPUR_M)
 
 
@@ -87,30 +77,6 @@ def drop_spurs(network: LineNetwork, length_m: float) -> LineNetwork:
         keep = np.ones(len(network.lines), dtype=bool)
         keep[rows[first]] = False
         network = weld_pairs(network.select(keep))
-
-
-def drop_bubbles(network: LineNetwork, apart_m: float) -> LineNetwork:
-    """Of several lines between the same two junctions, keep the shortest; drop short loops at a single junction.
-
-    The other lines are dropped if they are short, or if no part of them is further than `apart_m` from the shortest.
-    """
-    lengths = network.lengths()
-    degrees = network.degrees()
-    keep = np.ones(len(network.lines), dtype=bool)
-    shortest: dict[tuple[int, ...], np.ndarray] = {}
-    for number in np.argsort(lengths, kind="stable").tolist():
-        if lengths[number] >= SLIT_M:
-            break
-        link = tuple(sorted(network.ends[number].tolist()))
-        if degrees[list(link)].min() <= 2:
-            continue
-        points = even_points(network.lines[number], SLIT_M)
-        if lengths[number] < BUBBLE_M:
-            keep[number] = link[0] != link[1] and link not in shortest
-        elif link in shortest:
-            keep[number] = cKDTree(shortest[link]).query(points)[0].max() > apart_m
-        shortest.setdefault(link, points)
-    return network.select(keep)
 
 
 def drop_rungs(network: LineNetwork, length_m: float) -> LineNetwork:
@@ -165,14 +131,8 @@ def ends_by_node(network: LineNetwork) -> Iterable[tuple[int, list[int]]]:
 def unsteadiness(one: np.ndarray, other: np.ndarray, length_m: float) -> float:
     """Measure how far two lines are off one curve of constant curvature through both, metres rms.
 
-    Headings are summed along the way, which unrolls tight curves as well.
-
-    Parameters
-    ----------
-    one, other : (n, 2) arrays
-        Both lines, from the ends that face each other inward.
-    length_m : float
-        Length of each that counts.
+    Both are given from the ends that face each other inward, and `length_m` of each counts. Headings are summed along
+    the way, which unrolls tight curves as well.
     """
     coarse = int(round(COARSE_M / STEP_M))
     points = np.concatenate([even_points(one, length_m)[::coarse][::-1], even_points(other, length_m)[::coarse]])
@@ -189,19 +149,13 @@ def unsteadiness(one: np.ndarray, other: np.ndarray, length_m: float) -> float:
 
 
 def cut_kinks(network: LineNetwork, progress: Progress = SILENT) -> LineNetwork:
-    """Cut lines where they turn too sharply for a rail, and drop the bent part; the new ends are free.
-
-    Parameters
-    ----------
-    network : LineNetwork
-        Lines without passes.
-    progress : Progress
-    """
+    """Cut lines, without passes, where they turn too sharply for a rail, and drop the bent part; new ends are free."""
     lines: list[np.ndarray] = []
     ends: list[list[int]] = []
     nodes = list(network.nodes)
     for line, own in progress.follow(zip(network.lines, network.ends.tolist()), len(network.lines)):
-        for piece in _without_kinks(line):
+        for start, end in parts_without_turns(line, STEP_M, KINK_STEP_M, KINK_DEG):
+            piece = line if end - start >= length_along(line)[-1] else part(line, start, end)
             lines.append(piece)
             ends.append([])
             for node, was, now in zip(own, line[[0, -1]], piece[[0, -1]]):
@@ -209,29 +163,3 @@ def cut_kinks(network: LineNetwork, progress: Progress = SILENT) -> LineNetwork:
                 nodes += [] if (was == now).all() else [now]
     whole = LineNetwork(tuple(lines), np.array(nodes).reshape(-1, 2), np.array(ends, dtype=int).reshape(-1, 2))
     return weld_pairs(whole.tidy())
-
-
-def _without_kinks(line: np.ndarray) -> list[np.ndarray]:
-    """Cut a line into the pieces between its kinks."""
-    points, length_m = even_points(line), float(length_along(line)[-1])
-    bent = np.linspace(0.0, length_m, len(points))[_turns(points, KINK_M) > np.radians(KINK_DEG)]
-    if not len(bent):
-        return [line]
-    kinks = np.split(bent, np.flatnonzero(np.diff(bent) > TOGETHER_M) + 1)
-    pieces, t = [], 0.0
-    for start, end in [*((one[0] - KINK_M, one[-1] + KINK_M) for one in kinks), (length_m, np.inf)]:
-        if start - t > STEP_M:
-            pieces.append(part(line, t, min(start, length_m)))
-        t = end
-    return pieces
-
-
-def _turns(points: np.ndarray, length_m: float) -> np.ndarray:
-    """Measure the angle between the parts of a length before and behind each even point of a line, radians, (n,)."""
-    reach = int(round(length_m / STEP_M))
-    turn = np.zeros(len(points))
-    if len(points) > 2 * reach:
-        back, ahead = points[reach:-reach] - points[: -2 * reach], points[2 * reach :] - points[reach:-reach]
-        cross = back[:, 0] * ahead[:, 1] - back[:, 1] * ahead[:, 0]
-        turn[reach:-reach] = np.abs(np.arctan2(cross, (back * ahead).sum(axis=1)))
-    return turn

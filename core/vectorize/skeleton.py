@@ -155,18 +155,9 @@ _BY_DISTANCE = 29 * _BY_SUM
 
 
 def veinerize(pixels: Pixels, distance: np.ndarray) -> np.ndarray:
-    """Link every pixel to its steepest deeper neighbours, one in each connected group of them.
+    """Link every pixel to its steepest deeper neighbours, one in each connected group of them, by chamfer distance.
 
-    Parameters
-    ----------
-    pixels : Pixels
-    distance : (n,) int array
-        Chamfer distance to the background.
-
-    Returns
-    -------
-    (e, 2) int array
-        Undirected edges; the graph has the components of the image and, as independent cycles, its holes.
+    Returns undirected edges, (e, 2); the graph has the components of the image and, as independent cycles, its holes.
     """
     count = len(pixels)
     depth = np.append(distance, 0)
@@ -184,19 +175,8 @@ def veinerize(pixels: Pixels, distance: np.ndarray) -> np.ndarray:
 def prune(edges: np.ndarray, distance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Remove leaves from the graph until every leaf drains enough area to be the end of a line.
 
-    Parameters
-    ----------
-    edges : (e, 2) int array
-    distance : (n,) int array
-        Chamfer distance; two units per pixel.
-
-    Returns
-    -------
-    edges : (f, 2) int array
-        Remaining edges.
-    tips : (n,) int array
-        For each pixel the far end of the longest branch removed from it, or the pixel itself: where a line that ends
-        at the pixel really ends.
+    The chamfer distance counts two units per pixel. Returns the remaining edges, (f, 2), and for each pixel the far end
+    of the longest branch removed from it, or the pixel itself, (n,): where a line that ends there really ends.
     """
     count = len(distance)
     needed = np.maximum(AREA_PIXELS, SECTOR_ANGLE / 8 * distance.astype(float) ** 2)
@@ -288,16 +268,9 @@ TANGENT_PIXELS = 25
 
 
 def trace(raster: RailRaster, pixels: Pixels, edges: np.ndarray, tips: np.ndarray) -> LineNetwork:
-    """Make polylines of the edges of a graph on doubled pixels.
+    """Make polylines of the edges, (e, 2), of a graph on pixels into which the cells of a raster were doubled.
 
-    Parameters
-    ----------
-    raster : RailRaster
-        Raster whose cells were doubled into the pixels.
-    pixels : Pixels
-    edges : (e, 2) int array
-    tips : (n,) int array
-        For each pixel, the pixel up to which a line that ends there is extended.
+    A line that ends at a pixel is extended up to its tip, (n,) numbers of pixels.
     """
     if len(edges) == 0:
         return LineNetwork((), np.empty((0, 2)), np.empty((0, 2), dtype=np.int64))
@@ -320,20 +293,8 @@ def trace(raster: RailRaster, pixels: Pixels, edges: np.ndarray, tips: np.ndarra
 def chains(edges: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
     """Cut a graph into chains at all vertices whose degree is not 2; a closed loop is cut at one of its vertices.
 
-    Every edge is two half-edges, each with a pointer to the next one; pointer doubling ranks them all at once.
-
-    Parameters
-    ----------
-    edges : (e, 2) int array
-    count : int
-        Number of vertices.
-
-    Returns
-    -------
-    vertices : (n,) int array
-        Vertices of all chains in sequence, both end nodes included.
-    borders : (c + 1,) int array
-        Where each chain begins in `vertices`.
+    Every edge is two half-edges, each with a pointer to the next one; pointer doubling ranks them all at once. Returns
+    the vertices of all chains in sequence, both end nodes included, and where each chain begins among them, (c + 1,).
     """
     tail, head = np.concatenate([edges, edges[:, ::-1]]).T
     number = np.arange(len(tail))

@@ -103,21 +103,10 @@ class _Cross:
         return cls(place, np.array([along, [-along[1], along[0]]]), half_angle)
 
     def height_of_curve(self, cells: np.ndarray, side: float) -> float | None:
-        """Find the height above the crossing, on one side of it, of a curve that touches both lines.
+        """Find the height of a curve that touches both lines above the crossing, 1 to the left of it, -1 to the right.
 
         A curve of radius R passes e = R h² / 2 above a crossing of half angle h. At x it is y = e + x² h² / (4 e)
-        above it, so every cell states an e.
-
-        Parameters
-        ----------
-        cells : (n, 2) array
-        side : float
-            1 to the left of the crossing, -1 to the right.
-
-        Returns
-        -------
-        float or None
-            None if cells show no such curve.
+        above it, so every cell, (n, 2), states an e. None if cells show no such curve.
         """
         x, y = self.axes @ (cells - self.place).T
         y = side * y
@@ -199,21 +188,10 @@ class Slip:
 
 
 def open_slips(network: LineNetwork, seen: cKDTree) -> tuple[LineNetwork, list[Slip]]:
-    """Draw the crossings inside slips with a single node, and find the slip curves.
+    """Draw the crossings inside slips as four straight legs that meet in one node, and find the slip curves.
 
-    Parameters
-    ----------
-    network : LineNetwork
-        Lines without passes.
-    seen : cKDTree
-        Places of rail cells.
-
-    Returns
-    -------
-    network : LineNetwork
-        In which four straight legs meet in the middle of each slip.
-    slips : list of Slip
-        What `add_curves` adds once the crossings are resolved.
+    The lines have no passes, and `seen` holds the places of rail cells. The slips are what `add_curves` adds once the
+    crossings are resolved.
     """
     slips = _paired(_find(network, seen))
     for slip in slips:
@@ -355,14 +333,7 @@ def _as_crossing(network: LineNetwork, slip: Slip) -> LineNetwork:
 
 
 def add_curves(network: LineNetwork, slips: Sequence[Slip]) -> LineNetwork:
-    """Add the curves of slips, which begin and end on the lines that they touch.
-
-    Parameters
-    ----------
-    network : LineNetwork
-    slips : sequence of Slip
-        Those whose crossing has not been resolved are left out.
-    """
+    """Add the curves of slips, which begin and end on the lines that they touch, where the crossing was resolved."""
     for slip in slips:
         near = [np.hypot(*(line - slip.cross.place).T) for line in network.lines]
         through = [n for n, one in enumerate(near) if one.min() < STRAY_M and 0 < one.argmin() < len(one) - 1]

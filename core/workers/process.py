@@ -15,6 +15,7 @@ import time
 from collections.abc import Hashable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
+from enum import IntEnum
 from queue import SimpleQueue
 from typing import Any, Callable
 
@@ -31,12 +32,24 @@ NO_WINDOW = getattr(subprocess, "CREATE_NO_WINDOW", 0)
 REPORT_EVERY_S = 0.1
 """Least time between two reports of the fraction that is done, and interval at which cancellation is checked."""
 
-READY, FRACTION, STATUS, ANSWER, ENDED = range(5)
-"""What a message says: the process has started; how much of the task is done; what it is doing; its `Answer`; the
-process has ended."""
 
-Send = Callable[[int, Any], None]
-"""Sends a message: one of the above, and what belongs to it."""
+class Kind(IntEnum):
+    """What a message says."""
+
+    READY = 0
+    """The process has started."""
+    FRACTION = 1
+    """How much of the task is done."""
+    STATUS = 2
+    """What the task is doing."""
+    ANSWER = 3
+    """The `Answer`."""
+    ENDED = 4
+    """The process has ended."""
+
+
+Send = Callable[[Kind, Any], None]
+"""Sends a message: its kind, and what belongs to it."""
 
 
 @dataclass(frozen=True)
@@ -79,10 +92,11 @@ class Worker:
         """The number of the process."""
         return self._process.pid
 
-    def send(self, task: bytes) -> None:
-        """Send a task; if the process has ended, a message says so."""
+    def send(self, task: Task, inputs: Mapping[Hashable, bytes]) -> None:
+        """Send a task and the pickled results that it takes; if the process has ended, a message says so."""
+        content = pickle.dumps((task, dict(inputs)), pickle.HIGHEST_PROTOCOL)
         try:
-            pickle.dump(task, self._process.stdin, pickle.HIGHEST_PROTOCOL)  # type: ignore[arg-type]
+            pickle.dump(content, self._process.stdin, pickle.HIGHEST_PROTOCOL)  # type: ignore[arg-type]
             self._process.stdin.flush()  # type: ignore[union-attr]
         except OSError:
             self._process.kill()
@@ -101,7 +115,7 @@ class Worker:
             while True:
                 messages.put((self, *pickle.load(self._process.stdout)))  # type: ignore[arg-type] # nosec B301
         except Exception:  # noqa: BLE001 - cut off in the middle, a message can raise anything
-            messages.put((self, ENDED, None))
+            messages.put((self, Kind.ENDED, None))
 
 
 @dataclass(frozen=True)
@@ -129,16 +143,16 @@ def serve() -> None:
     output = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what libraries print would be taken for messages
 
-    def send(kind: int, content: Any) -> None:
+    def send(kind: Kind, content: Any) -> None:
         pickle.dump((kind, content), output, pickle.HIGHEST_PROTOCOL)
         output.flush()
 
     tasks: SimpleQueue[bytes] = SimpleQueue()
     threading.Thread(target=_receive, args=(tasks,), daemon=True).start()
-    send(READY, None)
+    send(Kind.READY, None)
     once = Once()
     while True:
-        send(ANSWER, answer(tasks.get(), once, send))
+        send(Kind.ANSWER, answer(tasks.get(), once, send))
 
 
 def _receive(tasks: SimpleQueue[bytes]) -> None:
@@ -150,13 +164,8 @@ def _receive(tasks: SimpleQueue[bytes]) -> None:
             os._exit(0)
 
 
-def packed(task: Task, inputs: Mapping[Hashable, bytes]) -> bytes:
-    """Return a task and the pickled results that it takes, as `answer` reads them."""
-    return pickle.dumps((task, dict(inputs)), pickle.HIGHEST_PROTOCOL)
-
-
 def answer(content: bytes, once: Once, send: Send) -> Answer:
-    """Execute a task; errors of every kind are for the parent process to raise."""
+    """Execute what `Worker.send` has sent; errors of every kind are for the parent process to raise."""
     heard = _Heard(send)
     try:
         task, inputs = pickle.loads(content)  # nosec B301
@@ -187,10 +196,10 @@ class _Heard(Progress):
         now = time.monotonic()
         if now - self._sent >= REPORT_EVERY_S:
             self._sent = now
-            self._send(FRACTION, fraction)
+            self._send(Kind.FRACTION, fraction)
 
     def status(self, text: str) -> None:
-        self._send(STATUS, text)
+        self._send(Kind.STATUS, text)
 
     def info(self, text: str) -> None:
         self.said.append(("info", text))

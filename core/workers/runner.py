@@ -15,19 +15,7 @@ from ..errors import RailExtractError
 from ..kernels import cores
 from ..progress import SILENT, Progress, counted
 from ..tasks import InTurn, Name, Results, Runner, Task, turns
-from .process import (
-    ANSWER,
-    ENDED,
-    FRACTION,
-    READY,
-    REPORT_EVERY_S,
-    STATUS,
-    Answer,
-    Interpreter,
-    Messages,
-    Worker,
-    packed,
-)
+from .process import REPORT_EVERY_S, Answer, Interpreter, Kind, Messages, Worker
 
 WORTH_S = 5.0
 """Least work, in seconds, for which workers are started: that takes each of them one to two seconds."""
@@ -130,7 +118,7 @@ class Workers:
             for _ in range(missing):
                 self._workers.append(Worker(interpreter, self._messages))
             for _ in range(missing):
-                if _next(self._messages, progress)[1] != READY:
+                if _next(self._messages, progress)[1] != Kind.READY:
                     raise OSError("they end at once")
         except (OSError, RailExtractError) as error:
             self.end()
@@ -167,19 +155,19 @@ class _Run:
             if self._tasks[name].returned:
                 yield name, pickle.loads(answer.result)  # nosec B301
 
-    def _hear(self, worker: Worker, kind: int, content: Any) -> None:
+    def _hear(self, worker: Worker, kind: Kind, content: Any) -> None:
         """Note what a worker says, and give it a new task if it has finished one."""
         name = self._running[worker]
-        if kind == ENDED:
+        if kind == Kind.ENDED:
             raise RailExtractError(
                 f"{self._tasks[name].label} failed, because its worker process ended: close other programs that take "
                 "memory, or set WORKERS to 1."
             )
-        if kind == STATUS:
+        if kind == Kind.STATUS:
             self._progress.status(content)
-        elif kind == FRACTION:
+        elif kind == Kind.FRACTION:
             self._advance(name, content)
-        elif kind == ANSWER:
+        elif kind == Kind.ANSWER:
             self._idle.append(worker)
             self._advance(name, 1.0)
             self._finish(name, content)
@@ -204,7 +192,7 @@ class _Run:
                 self._waiting.remove(name)
                 worker = self._idle.pop()
                 self._running[worker] = name
-                worker.send(packed(task, self._kept.take(task)))
+                worker.send(task, self._kept.take(task))
 
     def _advance(self, name: Hashable, fraction: float) -> None:
         self._done_s[name] = fraction * self._tasks[name].weight
@@ -217,7 +205,7 @@ def _is_worth(tasks: Mapping[Any, Task]) -> bool:
     return total_s >= WORTH_S and sum(not task.inputs for task in tasks.values()) > 1
 
 
-def _next(messages: Messages, progress: Progress) -> tuple[Worker, int, Any]:
+def _next(messages: Messages, progress: Progress) -> tuple[Worker, Kind, Any]:
     """Wait for a message; the user may cancel meanwhile."""
     while True:
         progress.check()

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ...core.classify.settings import MARGIN_M, Settings
 from ...core.classify.square import Classified
+from ...core.grow.growth import Rail
+from ...core.grow.heads import OnHeads
+from ...core.grow.settings import GrowSettings
 from ...core.labelling.finding import search_square
 from ...core.progress import SILENT, Progress
 from ...core.rails import SearchFigures
-from ...core.squares.grid import points_by_square, unique_keys
+from ...core.squares.grid import Key, points_by_square, unique_keys
 from ...core.tasks import Context, Once
 
 
@@ -41,3 +46,29 @@ def classify_cloud(xyz: np.ndarray, settings: Settings, progress: Progress = SIL
         rail[number[found.rail]] = True
         figures += found.figures
     return Classified(rail, figures)
+
+
+class GrowingCloud:
+    """A cloud in memory in which rails grow.
+
+    Parameters
+    ----------
+    xyz : (n, 3) array
+        Metres from the zero of the coordinate system.
+    settings : GrowSettings
+    """
+
+    def __init__(self, xyz: np.ndarray, settings: GrowSettings) -> None:
+        self._squares = points_by_square(xyz, settings.classification.side_m, MARGIN_M)
+        self._xyz = xyz
+        self.heads = OnHeads(lambda key: xyz[self._numbers(key)], settings)
+
+    def _numbers(self, key: Key) -> np.ndarray:
+        return self._squares.get(key, np.empty(0, dtype=np.int64))
+
+    def on(self, rails: Sequence[Rail]) -> np.ndarray:
+        """Return which points are on rails, (n,) bool."""
+        found = np.zeros(len(self._xyz), dtype=bool)
+        for key, numbers in self.heads.on(rails):
+            found[self._numbers(key)[numbers]] = True
+        return found

@@ -73,7 +73,7 @@ class BuildTrackCenterlines(RailAlgorithm):
         from ...core.checks.lines import with_tracks
         from ...core.fields import CENTERLINES, RAILS
         from ...core.output.layers import lines_layer
-        from ...core.squares.steps import tracks_of
+        from ...core.tracks.centerlines import tracks_of
         from ..reading.line_layers import read_rails
 
         rails, frame = read_rails(values.lines("INPUT"), progress.span(0, READING))

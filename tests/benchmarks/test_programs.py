@@ -1,6 +1,9 @@
-"""The benchmarks: each finds what it imports, and the functions whose time it takes."""
+"""The benchmarks: each finds what it imports and measures, and its processes end with the program that started them."""
 
+import os
 import runpy
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -16,3 +19,30 @@ def test_a_benchmark_fits_the_code_that_it_measures(program, monkeypatch):
     found = runpy.run_path(str(program))
     assert [name for name in found.get("STEPS", ()) if not hasattr(steps, name)] == []
     assert [name for owner, name, *_ in found.get("STAGES", ()) if name not in vars(owner)] == []
+
+
+PROGRAM = """
+import os, time
+from processes import processes
+
+if __name__ == "__main__":
+    pool = processes(1)
+    print(pool.submit(os.getpid).result(), flush=True)
+    pool.submit(time.sleep, 600)
+    time.sleep(600)
+"""
+
+
+def test_a_process_ends_when_the_program_that_started_it_is_killed(tmp_path):
+    program = tmp_path / "program.py"
+    program.write_text(PROGRAM)
+    environment = {**os.environ, "PYTHONPATH": str(PROGRAMS[0].parent)}
+    parent = subprocess.Popen([sys.executable, program], stdout=subprocess.PIPE, env=environment, text=True)
+    number = int(parent.stdout.readline())
+    assert number != parent.pid
+    parent.kill()
+    try:
+        parent.communicate(timeout=60)  # the output ends with the last process that has it
+    except subprocess.TimeoutExpired:
+        os.kill(number, 9)
+        raise

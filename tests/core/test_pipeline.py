@@ -16,9 +16,10 @@ from rail_extract.core.rails import RailLine, SearchFigures
 from rail_extract.core.raster import cell_size, rasterize
 from rail_extract.core.squares import steps
 from rail_extract.core.squares.grid import MemorySource
-from rail_extract.core.squares.steps import lines_of, tracks_of
+from rail_extract.core.squares.steps import lines_of
 from rail_extract.core.standards import STANDARDS, RailStandard
 from rail_extract.core.tasks import InTurn
+from rail_extract.core.tracks.centerlines import tracks_of
 from rail_extract.laboratory.curves import Element, trace, transition_curve
 from rail_extract.laboratory.scenes.plain import straight
 from rail_extract.laboratory.scenes.scanner import Scanner

@@ -228,7 +228,7 @@ def divided(bench):
 
 def ended_workers(bench):
     """The system ends a worker process, as Linux does if memory is short."""
-    bench.patch.setattr(process.Worker, "send", lambda self, task: os.kill(self.number, signal.SIGKILL))
+    bench.patch.setattr(process.Worker, "send", lambda self, *task: os.kill(self.number, signal.SIGKILL))
     return divided(bench)
 
 

@@ -30,6 +30,7 @@ from qgis.core import (  # noqa: E402
 from rail_extract.core.errors import RailExtractError  # noqa: E402
 from rail_extract.core.progress import Progress  # noqa: E402
 from rail_extract.core.squares import steps  # noqa: E402
+from rail_extract.core.tracks import centerlines  # noqa: E402
 
 from .clouds import SHAPES, write_las  # noqa: E402
 
@@ -74,7 +75,7 @@ def qgis() -> QgsApplication:
 
         qgis.plugin = classFactory(None)  # type: ignore[attr-defined]
         qgis.plugin.initProcessing()  # type: ignore[attr-defined]
-        steps.tracks_of, steps.lines_of = remembered(steps.tracks_of), remembered(steps.lines_of)
+        centerlines.tracks_of, steps.lines_of = remembered(centerlines.tracks_of), remembered(steps.lines_of)
     return application
 
 

@@ -114,10 +114,6 @@ def test_a_ring_has_no_end():
     assert displacement(arc(25.0, 2 * np.pi * 25.0), 2.0) == pytest.approx(1.8 * 2.0**4 / 25.0**3, abs=5e-4)
 
 
-def test_a_straight_line_stays():
-    assert displacement(np.array([[0.0, 0.0], [30.0, 10.0]]), 3.0) == pytest.approx(0, abs=1e-9)
-
-
 def test_three_metres_are_too_much_in_a_tram_curve():
     assert warned(arc(25.0), 3.0) == [
         "SMOOTHING_XY of 3 m displaces lines in curves by up to 98 mm, more than points can correct: "

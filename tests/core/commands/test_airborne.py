@@ -87,12 +87,3 @@ def test_polygons_as_guide_are_refused(flown, tmp_path, capsys):
     assert main(["airborne", *words, "--centerlines", str(tmp_path / "out.gpkg")]) == 1
     assert "has polygons: give lines along the tracks, one for each." in capsys.readouterr().err
     assert not (tmp_path / "out.gpkg").exists()
-
-
-def test_impossible_values_are_refused(flown, tmp_path, capsys):
-    assert run(flown, tmp_path, "--workers", "-1") == 1
-    assert "--workers" in capsys.readouterr().err
-    for option, value in (("--reach", "0"), ("--footprint", "nan")):
-        with pytest.raises(SystemExit):
-            run(flown, tmp_path, option, value)
-        assert f"argument {option}: {value} is not a positive number" in capsys.readouterr().err

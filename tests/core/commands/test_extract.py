@@ -227,15 +227,6 @@ def test_a_wrong_option_is_refused_before_the_run(tiles, tmp_path, monkeypatch, 
     assert said in capsys.readouterr().err
 
 
-def test_a_geopackage_in_use_is_refused_before_the_run(tiles, tmp_path, capsys):
-    out = tmp_path / "out.gpkg"
-    out.write_text("theirs")
-    (tmp_path / "out.gpkg-wal").write_text("pending")
-    assert main(["extract", str(tiles), "--rails", str(out)]) == 1
-    assert f"{out} is open in another program" in capsys.readouterr().err
-    assert out.read_text() == "theirs"
-
-
 def test_options_are_read_from_a_file(tmp_path, capsys):
     (tmp_path / "tiles.txt").write_text("gone.laz\n--rails\nout.gpkg\n")
     assert main(["extract", f"@{tmp_path / 'tiles.txt'}"]) == 1

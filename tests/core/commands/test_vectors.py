@@ -2,10 +2,11 @@
 
 import os
 
+import numpy as np
 import pytest
 from rail_extract.core.errors import ParameterError
 
-pytest.importorskip("pyogrio")
+pyogrio, shapely = pytest.importorskip("pyogrio"), pytest.importorskip("shapely")
 
 from rail_extract.core.commands import vectors  # noqa: E402
 
@@ -25,3 +26,13 @@ def test_a_pipe_is_refused_instead_of_waited_for(tmp_path):
     os.mkfifo(tmp_path / "seeds.gpkg")
     with pytest.raises(ParameterError, match="is a pipe"):
         vectors.read_seeds(tmp_path / "seeds.gpkg", None)
+
+
+def test_a_layer_of_a_file_is_named(tmp_path):
+    path, lines = tmp_path / "two.gpkg", shapely.linestrings([[(0, 0), (9, 0)], [(0, 5), (9, 5)]])
+    for name, line in zip(("first", "second"), lines):
+        shape = np.array([shapely.to_wkb(line)], object)
+        pyogrio.raw.write(path, shape, [], [], layer=name, geometry_type="LineString", crs="EPSG:25832", append=False)
+    for name, y in (("", 0), ("|layername=first", 0), ("|layername=second", 5)):
+        (line,) = vectors.read_lines(f"{path}{name}", None)
+        assert line[:, 1].tolist() == [y, y]

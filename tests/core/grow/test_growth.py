@@ -6,11 +6,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as some
 from rail_extract.core.errors import Cancelled
 from rail_extract.core.grow.follow import Reason
-from rail_extract.core.grow.growth import grow, on_rails
-from rail_extract.core.grow.points import Buckets
+from rail_extract.core.grow.growth import grow
 from rail_extract.core.grow.settings import GrowSettings
 from rail_extract.core.parameters import GrowParameters
 from rail_extract.core.progress import Progress
+from rail_extract.laboratory.ruler.whole_clouds import GrowingCloud
 from rail_extract.laboratory.scenes.raw_strips import GAUGE_M, SPACING_M, WIDTH_M, strip
 
 
@@ -20,8 +20,9 @@ def growing(**changes):
 
 def grown(track, along, left=SPACING_M / 2, **changes):
     own = growing(**changes)
-    found = grow(Buckets(track.xyz), track.at(along, left), own)
-    return found, on_rails(found.rails, track.xyz, own)
+    cloud = GrowingCloud(track.xyz, own)
+    found = grow(cloud.heads, track.at(along, left), own)
+    return found, cloud.on(found.rails)
 
 
 def scores(on, head):
@@ -129,11 +130,12 @@ def test_plants_on_the_rail_are_named():
 def test_a_turned_cloud_gives_the_same_points(turn):
     track = strip(12.0)
     rotation = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
-    own, moved = growing(), track.xyz.copy()
+    moved = track.xyz.copy()
     moved[:, :2] = moved[:, :2] @ rotation.T + [3e5, 5e6]
     _, straight = grown(track, 6.0)
-    found = grow(Buckets(moved), rotation @ track.at(6.0, SPACING_M / 2) + [3e5, 5e6], own)
-    assert np.mean(on_rails(found.rails, moved, own)[track.head] == straight[track.head]) > 0.95
+    cloud = GrowingCloud(moved, growing())
+    found = grow(cloud.heads, rotation @ track.at(6.0, SPACING_M / 2) + [3e5, 5e6], growing())
+    assert np.mean(cloud.on(found.rails)[track.head] == straight[track.head]) > 0.95
 
 
 def test_it_can_be_cancelled():
@@ -143,21 +145,13 @@ def test_it_can_be_cancelled():
 
     track = strip(10.0)
     with pytest.raises(Cancelled):
-        grow(Buckets(track.xyz), track.at(5.0, SPACING_M / 2), growing(), Impatient())
+        grow(GrowingCloud(track.xyz, growing()).heads, track.at(5.0, SPACING_M / 2), growing(), Impatient())
 
 
 @pytest.mark.parametrize(("length", "found"), [(4.0, False), (7.0, True)])
 def test_a_short_lone_bar_is_no_rail(length, found):
     bar = strip(16.0, rails=[lambda s: np.where(np.abs(s - 8.0) < length / 2, 0.3, np.nan)])
-    assert (grow(Buckets(bar.xyz), bar.at(8.0, 0.3), growing()) is not None) == found
-
-
-def test_a_crooked_row_of_stones_is_no_rail():
-    rng = np.random.RandomState(5)
-    places = np.arange(0.0, 20.5, 0.5)
-    crooked = np.cumsum(rng.choice([-0.03, 0.03], len(places)))
-    row = strip(20.0, rails=[lambda s: 0.3 + np.interp(s, places, crooked)])
-    assert grow(Buckets(row.xyz), row.at(10.0, 0.3 + crooked[20]), growing()) is None
+    assert (grow(GrowingCloud(bar.xyz, growing()).heads, bar.at(8.0, 0.3), growing()) is not None) == found
 
 
 @pytest.mark.parametrize("side", [1, -1])

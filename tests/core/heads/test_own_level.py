@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 from rail_extract.core.heads.head_points import HeadPoints
-from rail_extract.core.heads.own_level import _gradient, _levels, on_own_level
+from rail_extract.core.heads.own_level import on_own_level
 
 WIDTH = 0.072
 
@@ -53,26 +53,3 @@ def test_weeds_are_not_on_the_level():
     heads, above = own(band(0, 60), weeds)
     assert heads.all()
     assert not above.any()
-
-
-def level(start, end, up):
-    return np.column_stack([np.arange(start, end), np.full(end - start, up)]).astype(float)
-
-
-def test_the_gradient_sums_up_without_steps():
-    t = np.arange(0.05, 60.0, 0.1)
-    z = 0.03 * t + 0.05 * (t > 25)
-    at = np.array([0.0, 10.0, 40.0, 59.0])
-    found = _gradient(t, z, at)
-    np.testing.assert_allclose(found - found[0], 0.03 * at, atol=0.001)
-    assert _gradient(t[:4], z[:4], at).tolist() == [0.0] * 4
-
-
-def test_the_fullest_level_of_a_bin_is_the_first_and_three_points_make_one():
-    heights = {0: [0.0] * 5 + [0.3] * 4 + [-0.2] * 3 + [0.6] * 3, 2: [0.1] * 2, 3: [0.50, 0.51, 0.519, 0.54, 0.56]}
-    number = np.repeat(list(heights), [len(one) for one in heights.values()])
-    found = _levels(number, np.concatenate(list(heights.values())))
-    assert found.bin.tolist() == [0, 0, 0, 3]
-    assert found.height[[0, 1, 3]].tolist() == [0.0, 0.3, 0.51]
-    assert found.height[2] in (-0.2, 0.6)
-    assert len(_levels(np.zeros(0, dtype=int), np.zeros(0)).bin) == 0

@@ -75,12 +75,6 @@ def test_a_line_moves_onto_points_that_all_have_one_offset(offset):
     np.testing.assert_allclose(refined[:, 1], offset, atol=1e-6)
 
 
-@pytest.mark.parametrize("lopsided", [0.1, 0.3, 0.6])
-def test_a_denser_side_does_not_bias_the_line(lopsided):
-    refined = refine(network_of(wavy_line(80, 0.0, 30)), cloud(head(80, 120, lopsided=lopsided)), WIDTH).lines[0]
-    assert rms(refined[:, 1]) < 0.003
-
-
 @pytest.mark.parametrize("elements", [[Element(80.0)], [Element(80.0, 1 / 600, 1 / 600)]])
 @pytest.mark.parametrize("left_m", [0.0, 4.0, 8.0])
 def test_lines_find_scanned_heads_from_whichever_side_they_are_seen(elements, left_m):

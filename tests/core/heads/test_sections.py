@@ -1,12 +1,7 @@
 import numpy as np
 import pytest
 from rail_extract.core.heads.head_points import HeadPoints, stations_along
-from rail_extract.core.heads.sections import (
-    VIEW_STATIONS,
-    _pull,
-    likelier_width,
-    outline_middles,
-)
+from rail_extract.core.heads.sections import likelier_width, outline_middles
 from rail_extract.laboratory.scenes.scanner import NEW, Profile, Scanner, scan
 from rail_extract.laboratory.scenes.tracks import Railhead
 
@@ -69,20 +64,6 @@ def test_the_axis_stays_where_another_width_is_stated():
     """Without another outline it is 1.7 mm off."""
     points = scanned(60, noise_m=0.004, seed=3, width_m=0.062)
     assert abs(mean_m(middles_of(points))) < 0.001
-
-
-@pytest.mark.parametrize(
-    ("last", "density", "pull_m"), [(0.5, 30, 0.0), (0.7, 30, 0.0028), (0.51, 1, 0.0), (1.0, 30, 0.0)]
-)
-def test_a_view_that_changes_pulls_the_ends_of_a_section(last, density, pull_m):
-    """The share of points on the left half of the head changes along 40 m, if there are enough points to say so."""
-    random, count = np.random.RandomState(0), VIEW_STATIONS
-    station = np.repeat(np.arange(count), density)
-    is_left = random.random_sample(len(station)) < 0.5 + (last - 0.5) * station / count
-    is_left |= (station > 20) & (station < 28)
-    pull = _pull(station, is_left, count)
-    assert pull[-1] == pytest.approx(pull_m, abs=0.0009)
-    assert pull[0] == -pull[-1] and pull[count // 2] == 0.0
 
 
 def test_errors_of_middles_are_as_large_as_stated():

@@ -1,8 +1,8 @@
-"""The top of a head: its profile beyond its ends."""
+"""The top of a head: the disc that rolls along it, and its profile beyond its ends."""
 
 import numpy as np
 import pytest
-from rail_extract.core.heads.top import TAIL_M, Profile
+from rail_extract.core.heads.top import TAIL_M, Profile, rolling_disc
 
 
 def profile_of(t, z):
@@ -19,3 +19,32 @@ def test_a_profile_shorter_than_its_tail_is_level_beyond_its_ends():
     profile = profile_of(np.array([0.0, 0.9]), np.array([0.0, 0.09]))
     assert profile.at(np.array([-1.0, 0.45, 2.0])) == pytest.approx([0.0, 0.045, 0.09])
     assert profile_of(np.array([0.0, 1.0]), np.array([0.0, 0.1])).at(np.array([2.0])) == pytest.approx([0.2])
+
+
+STEP_M = 0.02
+
+
+def along(count):
+    """Chainages in successive bins of the disc."""
+    return STEP_M * np.arange(count) + np.where(np.arange(count) > 0, 0.3 * STEP_M, 0.0)
+
+
+@pytest.mark.parametrize("radius_m", [5.0, 20.0])
+def test_the_disc_sags_into_gaps(radius_m):
+    """By L² / (8 r) in the middle of a gap of length L."""
+    z = np.zeros(150)
+    z[50:101] = -0.2
+    surface = rolling_disc(along(150), z, radius_m, 0.1)
+    assert surface[75] == pytest.approx(-((52 * STEP_M) ** 2) / (8 * radius_m), rel=5e-3)
+    np.testing.assert_allclose(np.delete(surface, np.arange(50, 101)), 0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_no_point_is_above_the_disc_and_no_place_for_it_is_lower(seed):
+    z = np.random.default_rng(seed).normal(0, 0.01, 300)
+    centres = np.arange(-200, 500)
+    disc = np.sqrt(20.0**2 - (STEP_M * (np.arange(300)[:, None] - centres)) ** 2) - 20.0
+    held = (z[:, None] + disc).max(axis=0)
+    surface = rolling_disc(along(300), z, 20.0, 0.1)
+    np.testing.assert_allclose(surface[100:-100], (held - disc).min(axis=1)[100:-100], atol=1e-9)
+    assert (surface >= z - 1e-12).all()

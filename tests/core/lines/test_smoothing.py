@@ -59,13 +59,6 @@ def test_equals_quadrature(seed, sigma):
     np.testing.assert_allclose(smoothed, [fit_by_quadrature(line, s, sigma) for s in stations], atol=1e-11)
 
 
-def test_parabolas_stay_with_free_ends():
-    t = np.arange(0, 30, 0.005)
-    stations = np.linspace(0, t[-1], 50)
-    smoothed = smooth_profile(t, 0.3 - 0.2 * t + 0.05 * t**2, 3.0, stations)
-    np.testing.assert_allclose(smoothed, 0.3 - 0.2 * stations + 0.05 * stations**2, atol=1e-5)
-
-
 @pytest.mark.parametrize("wavelength", [1.86, 4.93, 10.9, 40.0])
 def test_waves_are_damped_by_the_transfer_function(wavelength):
     t = np.arange(0, 160, 0.01)

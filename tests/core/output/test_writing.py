@@ -103,15 +103,3 @@ def test_the_other_tables_of_a_file_stay(tmp_path):
     assert counts == {"signals": 3, "rails": 1, "quality": 2}
     assert tables_in(path) == set(counts)
     assert [file.name for file in tmp_path.iterdir()] == ["all.gpkg"]
-
-
-def test_layers_for_other_programs_are_those_of_their_suffix(tmp_path):
-    frame = LocalFrame(np.array([1000.0, 2000.0, 0.0]), crs_wkt="EPSG:32643")
-    rail = RailLine(np.array([[0.0, 0.0, 5.0], [3.0, 4.0, 5.5]]), 1, 10, 9, 1.0, 0.5, 0.0)
-    for name in ("rails.dxf", "rails.csv", "rails_points.csv"):
-        write_layers([lines_layer(RAILS, [rail])], Destination.at(tmp_path / name), frame)
-    assert "RAILS_10" in (tmp_path / "rails.dxf").read_text(encoding="ascii")
-    assert (
-        "LINESTRING Z (1000.0000 2000.0000 5.0000,1003.0000 2004.0000 5.5000)" in (tmp_path / "rails.csv").read_text()
-    )
-    assert (tmp_path / "rails_points.csv").read_text().splitlines()[-1] == "1,10,1003.0000,2004.0000,5.5000,5.000"

@@ -1,18 +1,48 @@
 """Lengths beyond limits: counted as by station, and the limits of the run are those of the findings."""
 
+import json
+import os
 import re
+import subprocess
+import sys
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.rails import Centerline, RailNetwork, TrackGeometry
+from rail_extract.core.report import build_page
 from rail_extract.core.report.findings import OFF_GAUGE, examine
 from rail_extract.core.report.limits import MAX_LIMIT_MM, QUANTITIES, lengths_beyond, limits_table
 from rail_extract.core.report.markup import metres
 
 COUNT = 101
+
+BROWSER = """
+import json, os, sys
+try:
+    from PyQt5.QtWebKitWidgets import QWebPage
+    from PyQt5.QtWidgets import QApplication
+except ImportError:
+    os._exit(77)
+application, page = QApplication([]), QWebPage()
+page.mainFrame().setHtml(open(sys.argv[1], encoding="utf-8").read())
+for quantity, limit in json.loads(sys.argv[2]):
+    page.mainFrame().evaluateJavaScript(
+        "var field = document.querySelector('input[data-limit=%s]');"
+        "if ('%s' != 'None') { field.value = '%s'; field.onchange(); }" % (quantity, limit, limit)
+    )
+    cells = (
+        "[].map.call(document.querySelector('tr[data-quantity=%s]').cells,"
+        "function (one) { return one.textContent })"
+    )
+    print(json.dumps(page.mainFrame().evaluateJavaScript(cells % quantity)))
+sys.stdout.flush()
+os._exit(0)  # WebKit crashes where Python removes it
+"""
+"""Enters limits one by one; None leaves the one of the run. Prints the cells of the row after each."""
 
 
 @given(values=arrays(float, st.integers(0, 30), elements=st.floats(0, 900, width=32) | st.just(np.nan)))
@@ -25,34 +55,17 @@ def test_lengths_are_those_of_the_stations_beyond_each_limit(values):
         assert (found[limit] if limit < len(found) else 0.0) == expected
 
 
-def track_findings():
-    """A track of 100 m with 20 m off gauge, twist to either side, and 5 m without points."""
-    along = np.arange(float(COUNT))
-    gauge_mm, cant_mm = np.full(COUNT, 1435.0), np.full(COUNT, -30.0)
-    gauge_mm[40:60] = 1420.0
-    bridged = np.zeros(COUNT, dtype=bool)
-    bridged[90:95] = True
-    gauge_mm[90:95], twist_mm = 1800.0, np.linspace(-8.0, 8.0, COUNT)
-    plain, none = np.zeros(COUNT), np.full(COUNT, np.nan)
+def track(**profiles):
+    """A track of 100 m with 20 m off gauge, twist to either side, and 5 m without points, but for `profiles`."""
+    along, plain, none = np.arange(float(COUNT)), np.zeros(COUNT), np.full(COUNT, np.nan)
+    gauge_mm, bridged = np.full(COUNT, 1435.0), np.zeros(COUNT, dtype=bool)
+    gauge_mm[40:60], gauge_mm[90:95], bridged[90:95] = 1420.0, 1800.0, True
+    usual = {"gauge_mm": gauge_mm, "cant_mm": plain - 30, "twist_mm": np.linspace(-8.0, 8.0, COUNT), "radius_m": none}
+    usual |= {"grade_pm": plain, "sigma_mm": plain + 1.5, "points": np.full(COUNT, 100), "bridged": bridged}
+    usual |= {"strips": np.ones(COUNT, int), "strip_mm": none, "sigmaz_mm": plain + 0.5}
     xyz = np.column_stack([along, plain, plain])
-    geometry = TrackGeometry(
-        track_id=1,
-        xyz=xyz,
-        chainage_m=along,
-        gauge_mm=gauge_mm,
-        cant_mm=cant_mm,
-        twist_mm=twist_mm,
-        radius_m=none,
-        grade_pm=plain,
-        sigma_mm=np.full(COUNT, 1.5),
-        points=np.full(COUNT, 100),
-        bridged=bridged,
-        strips=np.ones(COUNT, dtype=int),
-        strip_mm=none,
-        sigmaz_mm=np.full(COUNT, 0.5),
-    )
     line = Centerline(xyz, 1, 10, (1,), (2,), 1435.0, 1.0, 0.0, 0.0, 0.0)
-    return line, geometry
+    return line, TrackGeometry(1, xyz, along, **{**usual, **profiles})
 
 
 def network(line, geometry):
@@ -66,7 +79,7 @@ def rows_of(html):
 
 
 def test_the_limits_of_the_run_are_those_of_the_findings():
-    findings = examine(network(*track_findings()), (1.435,))
+    findings = examine(network(*track()), (1.435,))
     rows = rows_of(limits_table(findings.tracks))
     assert list(rows) == [one.name for one in QUANTITIES]
     assert rows["gauge"][2:] == ["15.0 mm", "40.0 m", "20 m", "21.1 %"]
@@ -77,7 +90,29 @@ def test_the_limits_of_the_run_are_those_of_the_findings():
 
 
 def test_a_track_without_values_has_an_empty_row():
-    line, geometry = track_findings()
-    geometry.twist_mm[:] = np.nan
-    rows = rows_of(limits_table(examine(network(line, geometry), (1.435,)).tracks))
+    rows = rows_of(limits_table(examine(network(*track(twist_mm=np.full(COUNT, np.nan))), (1.435,)).tracks))
     assert rows["twist"][2:] == ["", "", "", ""]
+
+
+def test_a_limit_that_is_entered_is_counted(tmp_path):
+    """In QtWebKit, where it is installed: what the reader enters is counted at once."""
+    along, plain = np.arange(float(COUNT)), np.zeros(COUNT)
+    rising = track(gauge_mm=1435 + 0.2 * along, cant_mm=plain, twist_mm=0.1 * along, bridged=np.zeros(COUNT, bool))
+    (tmp_path / "report.html").write_text(build_page(network(*rising), (1.435,), "cloud.laz"), encoding="utf-8")
+    steps = {
+        ("gauge", None): ["20.0 mm", "100.0 m", "50 m", "49.5 %"],
+        ("gauge", "15"): ["20.0 mm", "100.0 m", "25 m", "24.5 %"],
+        ("gauge", "10"): ["20.0 mm", "100.0 m", "50 m", "49.5 %"],  # the script counts what the report states
+        ("twist", None): ["10.0 mm", "100.0 m", "", ""],
+        ("twist", "5"): ["10.0 mm", "100.0 m", "50 m", "49.5 %"],
+        ("twist", ""): ["10.0 mm", "100.0 m", "", ""],
+        ("sigma", "1"): ["1.5 mm", "0.0 m", "100 m", "100.0 %"],
+        ("sigma", "400"): ["1.5 mm", "0.0 m", "0.0 m", "0.0 %"],
+    }
+    command = [sys.executable, "-c", BROWSER, str(tmp_path / "report.html"), json.dumps(list(steps))]
+    environment = {**os.environ, "QT_QPA_PLATFORM": "offscreen"}
+    ended = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=60)
+    if ended.returncode == 77:
+        pytest.skip("QtWebKit is not installed.")
+    found = [json.loads(line)[2:] for line in ended.stdout.splitlines()]
+    assert dict(zip(steps, found)) == steps, ended.stderr

@@ -54,21 +54,3 @@ def test_thin_rails_are_drawn_for_the_network_and_measured_on_their_points():
         side_m = spacing_m * (rail.xyz[0, 1] > spacing_m / 2)
         assert np.sqrt(np.mean((rail.xyz[:, 1] - side_m) ** 2)) < 0.012
         assert rail.points < 210
-
-
-@pytest.mark.parametrize("passes", [1, 3])
-def test_the_network_sees_64_cells_per_pass_around_a_square(passes, monkeypatch):
-    """As far as a pass carries what it sees, measured with the shipped weights."""
-    parameters = Parameters(STANDARD.gauge_m, STANDARD.head_width_m, passes, square_tiles=4)
-    side_m, cell_m = square_side(parameters), cell_size(STANDARD.gauge_m, STANDARD.head_width_m)
-    x = np.arange(-20, side_m + 20, 0.01)
-    source = MemorySource(
-        RailPoints(np.column_stack([x, np.full(len(x), 10.0), np.zeros(len(x))]), LocalFrame(np.zeros(3)), 10), side_m
-    )
-    shown = []
-    monkeypatch.setattr("rail_extract.core.squares.steps.clean", lambda raster, *_: shown.append(raster) or raster)
-    square = next(one for one in lay_out([source], source) if one.key == (0, 0))
-    clean_square(source, square, parameters, None)
-    seen = shown[0].to_local(shown[0].cells())[:, 0]
-    assert seen.min() == pytest.approx(-64 * passes * cell_m, abs=cell_m)
-    assert seen.max() == pytest.approx(side_m + 64 * passes * cell_m, abs=cell_m)

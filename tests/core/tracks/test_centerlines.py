@@ -3,9 +3,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from rail_extract.core.errors import NoTrackError
+from rail_extract.core.parameters import Parameters
 from rail_extract.core.rails import RailLine
 from rail_extract.core.tracks.centerlines import (
-    CenterlineParameters,
     build_centerlines,
 )
 from rail_extract.laboratory.curves import Element, trace, transition_curve
@@ -13,9 +13,8 @@ from rail_extract.laboratory.rasters.turnouts import FORMS, branch
 from rail_extract.laboratory.ruler.lines import compare_lines
 from rail_extract.laboratory.scenes.tracks import Track
 
-RADIUS_M = 30.0
-
 GAUGE, WIDTH = 1.435, 0.072
+STANDARD = Parameters(GAUGE, WIDTH)
 SPACING = GAUGE + WIDTH
 STRAIGHT = trace([Element(60.0)], heading=0.7)
 CURVED = trace(transition_curve(30, 40, 60, 1 / 300), heading=-0.6)
@@ -50,7 +49,7 @@ def test_centerline_of_concentric_arcs_is_the_arc_between(radius, turned):
         flat(ring * np.column_stack([np.cos(angle), np.sin(angle)]))
         for ring in radius + SPACING * np.array([0.5, -0.5])
     ]
-    (line,) = build_centerlines(rails_of(arcs[0], arcs[1][::-1] if turned else arcs[1]), GAUGE, WIDTH)
+    (line,) = build_centerlines(rails_of(arcs[0], arcs[1][::-1] if turned else arcs[1]), STANDARD)
     tolerance = 1e-4 if radius > 100 else 4e-4  # in the tightest curve the chords between stations show
     np.testing.assert_allclose(np.hypot(*line.xyz[:, :2].T), radius, atol=tolerance)
     assert line.gauge_mm == pytest.approx(1435.0, abs=0.2)
@@ -67,7 +66,7 @@ def test_a_ring_becomes_one_closed_centerline(begins, turned):
         for radius, start in ((30 + 0.5 * SPACING, 1.0), (30 - 0.5 * SPACING, 1.0 + begins))
     )
     outer[-1], inner[-1] = outer[0], inner[0]
-    (line,) = build_centerlines(rails_of(outer, inner[::-1] if turned else inner), GAUGE, WIDTH)
+    (line,) = build_centerlines(rails_of(outer, inner[::-1] if turned else inner), STANDARD)
     np.testing.assert_array_equal(line.xyz[0], line.xyz[-1])
     np.testing.assert_allclose(np.hypot(*line.xyz[:, :2].T), 30, atol=3e-4)
     assert line.length_m == pytest.approx(60 * np.pi, rel=1e-4)
@@ -78,7 +77,7 @@ def test_a_ring_becomes_one_closed_centerline(begins, turned):
 def test_three_tracks_give_three_centerlines_at_gauge(curve):
     lines = [track(curve, left_m) for left_m in (0.0, 4.0, 8.0)]
     rails = rails_of(*(rail for left, right, _ in lines for rail in (left, right)))
-    found = build_centerlines(rails, GAUGE, WIDTH)
+    found = build_centerlines(rails, STANDARD)
     assert len(found) == 3
     assert [line.track_id for line in found] == [1, 2, 3]
     for line in found:
@@ -97,7 +96,7 @@ def test_cant_is_left_minus_right_along_the_line(sign, heading):
     """Rails and curve may run in either direction: only that of the line counts, which starts in the west."""
     curve = trace([Element(50.0)], heading=heading)
     left, right, _ = track(curve, cant=sign * 0.1, height=0.002 * curve.chainage)
-    (line,) = build_centerlines(rails_of(left, right[::-1]), GAUGE, WIDTH)
+    (line,) = build_centerlines(rails_of(left, right[::-1]), STANDARD)
     seen = sign if np.cos(heading) > 0 else -sign
     assert line.xyz[0, 0] < line.xyz[-1, 0]
     assert line.cant_mm == pytest.approx(100 * seen, abs=0.1)
@@ -111,7 +110,7 @@ def test_cant_is_left_minus_right_along_the_line(sign, heading):
 def test_largest_cant_keeps_its_sign():
     cant = np.linspace(0.02, -0.08, len(STRAIGHT.xy))
     left, right, _ = track(STRAIGHT, cant=cant)
-    (line,) = build_centerlines(rails_of(left, right), GAUGE, WIDTH)
+    (line,) = build_centerlines(rails_of(left, right), STANDARD)
     assert line.cantmax_mm == pytest.approx(-80, abs=1)
     assert line.cant_mm == pytest.approx(-30, abs=1)
 
@@ -121,7 +120,7 @@ def test_rails_broken_in_different_places_give_one_centerline(curve):
     left, right, middle = track(curve)
     left_parts, right_parts = without(left, 0.3, 0.32), without(right, 0.6, 0.62)
     rails = rails_of(left_parts[1], left_parts[0][::-1], right_parts[0], right_parts[1])
-    (line,) = build_centerlines(rails, GAUGE, WIDTH)
+    (line,) = build_centerlines(rails, STANDARD)
     result = compare_lines([line.xyz], [middle])
     assert result.completeness > 0.99
     assert result.lateral_p95_m < 0.003
@@ -135,7 +134,7 @@ def test_gaps_in_both_rails_are_bridged_up_to_the_maximum(gap, count):
     share = gap / CURVED.length_m
     left, right, middle = track(CURVED)
     parts = [*without(left, 0.5, 0.5 + share), *without(right, 0.5, 0.5 + share)]
-    found = build_centerlines(rails_of(*parts), GAUGE, WIDTH)
+    found = build_centerlines(rails_of(*parts), STANDARD)
     assert len(found) == count
     assert compare_lines([line.xyz for line in found], [middle]).lateral_p95_m < 0.012
 
@@ -143,7 +142,7 @@ def test_gaps_in_both_rails_are_bridged_up_to_the_maximum(gap, count):
 def test_long_tracks_are_one_line():
     curve = trace([Element(1500.0, 1 / 3000, 1 / 3000)], step_m=0.1)
     left, right, _ = track(curve)
-    (line,) = build_centerlines(rails_of(left, right), GAUGE, WIDTH)
+    (line,) = build_centerlines(rails_of(left, right), STANDARD)
     assert line.length_m == pytest.approx(1500.0, abs=0.5)
     assert (line.left_ids, line.right_ids) in (((1,), (2,)), ((2,), (1,)))
 
@@ -159,7 +158,7 @@ def test_turnouts_fork_into_two_centerlines(form, hand):
     rails = rails_of(
         outer, inner, *(line[np.linalg.norm(line - line[0], axis=1) > 8.0] for line in (branch_left, branch_right))
     )
-    found = build_centerlines(rails, GAUGE, WIDTH)
+    found = build_centerlines(rails, STANDARD)
     assert len(found) == 2
     result = compare_lines([line.xyz for line in found], [through, diverging])
     assert result.correctness > 0.995
@@ -170,7 +169,7 @@ def test_turnouts_fork_into_two_centerlines(form, hand):
 def test_rails_without_heights_give_a_centerline_without_heights():
     left, right, middle = track(CURVED)
     rails = rails_of(left * [1, 1, np.nan], right * [1, 1, np.nan])
-    (line,) = build_centerlines(rails, GAUGE, WIDTH)
+    (line,) = build_centerlines(rails, STANDARD)
     assert np.isnan(line.xyz[:, 2]).all()
     assert np.isnan(line.cant_mm)
     assert line.gauge_mm == pytest.approx(1435.0, abs=1.0)
@@ -188,7 +187,7 @@ def test_where_one_rail_is_missing_the_other_gives_the_height(cant, side):
         rails[side] = rails[side][cut]
         if cut.stop is None:
             rails[side : side + 1] = without(rails[side], 0.3, 0.7)
-        (line,) = build_centerlines(rails_of(*rails), GAUGE, WIDTH)
+        (line,) = build_centerlines(rails_of(*rails), STANDARD)
         t = np.hypot(*(line.xyz[:, :2] - middle[0, :2]).T)
         expected = np.interp(t, np.hypot(*(middle[:, :2] - middle[0, :2]).T), middle[:, 2])
         np.testing.assert_allclose(line.xyz[:, 2], expected, atol=0.002)
@@ -201,7 +200,7 @@ def test_gaps_of_rails_count_for_the_track():
     right_rail = replace(right_rail, gaps=np.array([[12.0, 15.0]]), bridged_m=3.0)
     # The gaps of both rails overlap by one metre, which counts once. Reversing a rail does not change its gaps.
     for rails in ([left_rail, right_rail], [left_rail.reversed(), right_rail], [left_rail, right_rail.reversed()]):
-        (line,) = build_centerlines(rails, GAUGE, WIDTH)
+        (line,) = build_centerlines(rails, STANDARD)
         assert line.bridged_m == pytest.approx(6.0, abs=0.01)
 
 
@@ -209,7 +208,7 @@ def test_gaps_of_rails_count_for_the_track():
 def test_the_bridged_length_of_a_track_is_unknown_if_the_gaps_of_a_rail_are(bridged_m):
     """Lines drawn by hand, or from a file that has lost the sections."""
     left, right = rails_of(*track(STRAIGHT)[:2])
-    (line,) = build_centerlines([left, replace(right, bridged_m=bridged_m)], GAUGE, WIDTH)
+    (line,) = build_centerlines([left, replace(right, bridged_m=bridged_m)], STANDARD)
     assert np.isnan(line.bridged_m)
 
 
@@ -220,7 +219,7 @@ def test_the_bridged_length_of_a_track_is_unknown_if_the_gaps_of_a_rail_are(brid
 def test_another_gauge_is_refused_with_the_spacing_measured(gauge, width, question):
     left, right, _ = track(CURVED, spacing=gauge + width)
     with pytest.raises(NoTrackError) as refusal:
-        build_centerlines(rails_of(left, right), GAUGE, WIDTH)
+        build_centerlines(rails_of(left, right), STANDARD)
     apart = round(1000 * (gauge + width))
     assert str(refusal.value) == f"No track of 1435 mm gauge found: rails are {apart} mm apart{question}"
 
@@ -229,17 +228,17 @@ def test_another_gauge_is_refused_with_the_spacing_measured(gauge, width, questi
 @pytest.mark.parametrize("off", [-0.35, -0.24, 0.24, 0.45])
 def test_rails_off_the_gauge_within_the_tolerance_make_a_track(curve, off):
     left, right, middle = track(curve, spacing=SPACING + off)
-    (line,) = build_centerlines(rails_of(left, right), GAUGE, WIDTH, CenterlineParameters(tolerance_m=0.5))
+    (line,) = build_centerlines(rails_of(left, right), replace(STANDARD, centerline_tolerance_m=0.5))
     assert line.gauge_mm == pytest.approx(1000 * (GAUGE + off), abs=0.5)
     assert compare_lines([line.xyz], [middle]).lateral_rmse_m < 0.001
 
 
 def test_single_rails_give_no_centerline():
     left, right, _ = track(STRAIGHT)
-    assert build_centerlines([], GAUGE, WIDTH) == ()
-    assert build_centerlines(rails_of(left), GAUGE, WIDTH) == ()
-    assert build_centerlines(rails_of(left, right + [2.0, -2.0, 0.0]), GAUGE, WIDTH) == ()
-    assert build_centerlines(rails_of(left[:4], right[:4]), GAUGE, WIDTH) == ()
+    assert build_centerlines([], STANDARD) == ()
+    assert build_centerlines(rails_of(left), STANDARD) == ()
+    assert build_centerlines(rails_of(left, right + [2.0, -2.0, 0.0]), STANDARD) == ()
+    assert build_centerlines(rails_of(left[:4], right[:4]), STANDARD) == ()
 
 
 @pytest.mark.parametrize("sign", [1, -1])
@@ -248,17 +247,9 @@ def test_cant_keeps_its_sign_on_a_centerline_that_is_turned_around(sign):
     curve = trace([Element(60.0), Element(30 * np.pi, 1 / 30, 1 / 30), Element(50.0)])
     left, right, _ = track(curve, cant=sign * np.linspace(0.02, 0.08, len(curve.xy)))
     parts = [part for line in (left, right) for part in without(line, 0.12, 0.12)]
-    (line,) = build_centerlines(rails_of(*parts), GAUGE, WIDTH)
+    (line,) = build_centerlines(rails_of(*parts), STANDARD)
     np.testing.assert_allclose(line.xyz[[0, -1], :2], curve.xy[[0, -1]], atol=0.05)
     assert line.xyz[0, 0] < line.xyz[-1, 0]
     assert line.cantmax_mm == pytest.approx(sign * 80, abs=0.5)
     assert line.cant_mm == pytest.approx(sign * 50, abs=0.5)
     assert (line.left_ids, line.right_ids) == ((1, 2), (3, 4))
-
-
-def ring(start=0.0, radius_m=RADIUS_M, turns=1.0, count=400):
-    angle = start + np.linspace(0, 2 * np.pi * turns, count)
-    xyz = np.column_stack([radius_m * np.cos(angle), radius_m * np.sin(angle), np.zeros(count)])
-    if turns == 1.0:
-        xyz[-1] = xyz[0]
-    return xyz

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from rail_extract.core.parameters import Parameters
 from rail_extract.core.polyline import length_along
 from rail_extract.core.rails import RailLine
 from rail_extract.core.tracks.centerlines import build_centerlines
@@ -14,8 +15,8 @@ from rail_extract.laboratory.rasters.turnouts import FORMS, branch
 from rail_extract.laboratory.ruler.lines import compare_lines
 from rail_extract.laboratory.scenes.tracks import Track
 
-GAUGE, WIDTH = 1.435, 0.072
-SPACING = GAUGE + WIDTH
+STANDARD = Parameters(1.435, 0.072)
+SPACING = 1.435 + 0.072
 CURVED = trace([Element(120.0, 1 / 400, 1 / 400)], heading=0.4)
 TRAM = trace([Element(40.0, 1 / 30, 1 / 30)], heading=1.0)
 LONGEST_GAP_M = 5.0
@@ -44,7 +45,7 @@ def without(line, *gaps):
 
 
 def build(*lines, progress=None):
-    return build_centerlines(rails_of(*lines), GAUGE, WIDTH, **({"progress": progress} if progress else {}))
+    return build_centerlines(rails_of(*lines), STANDARD, **({"progress": progress} if progress else {}))
 
 
 def checked(lines, truth, count=None):
@@ -172,8 +173,8 @@ def yard():
 @given(st.permutations(range(9)), st.lists(st.booleans(), min_size=9, max_size=9))
 def test_order_and_directions_of_rails_change_nothing(order, turned):
     rails = yard()
-    expected = build_centerlines(rails, GAUGE, WIDTH)
-    found = build_centerlines([rails[n].reversed() if turned[n] else rails[n] for n in order], GAUGE, WIDTH)
+    expected = build_centerlines(rails, STANDARD)
+    found = build_centerlines([rails[n].reversed() if turned[n] else rails[n] for n in order], STANDARD)
     assert [line.left_ids + line.right_ids for line in found] == [line.left_ids + line.right_ids for line in expected]
     for line, other in zip(found, expected):
         np.testing.assert_allclose(line.xyz, other.xyz, atol=1e-9)
@@ -193,7 +194,7 @@ def assert_same_lines(found, expected, apart_m):
 @given(st.lists(st.floats(5.0, 100.0), min_size=1, max_size=3), st.integers(0, 8))
 def test_cutting_a_rail_changes_nothing(places, number):
     rails = yard()
-    expected = build_centerlines(rails, GAUGE, WIDTH)
+    expected = build_centerlines(rails, STANDARD)
     line = rails[number].xyz
     last = length_along(line[:, :2])[-1]
     borders = [0.0, *sorted({place for place in places if place < last - 1}), last]
@@ -207,6 +208,6 @@ def test_cutting_a_rail_changes_nothing(places, number):
 def test_centerlines_rotate_and_move_with_their_rails(angle, east, north):
     turn = np.array([[np.cos(angle), np.sin(angle), 0], [-np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
     rails = yard()
-    expected = [line.xyz @ turn + [east, north, 0] for line in build_centerlines(rails, GAUGE, WIDTH)]
+    expected = [line.xyz @ turn + [east, north, 0] for line in build_centerlines(rails, STANDARD)]
     found = build(*(rail.xyz @ turn + [east, north, 0] for rail in rails))
     assert_same_lines([line.xyz for line in found], expected, 2e-4)

@@ -10,6 +10,7 @@ from rail_extract.core.heads.head_points import near_lines
 from rail_extract.core.heads.refinement import refine
 from rail_extract.core.lines.finishing import thin
 from rail_extract.core.lines.smoothing import smooth_network
+from rail_extract.core.parameters import Parameters
 from rail_extract.core.rails import NO_GAPS, Centerline, RailLine, Support
 from rail_extract.core.raster import cell_size, rasterize
 from rail_extract.core.squares import steps
@@ -53,7 +54,7 @@ def test_exact_rails_give_exact_geometry(sign, turned):
     """One of the rails may be reversed: only the direction of the centerline counts."""
     left, right = curved_track(sign).rails()
     rails = rail_lines(left[::-1] if turned else left, right)
-    lines = build_centerlines(rails, GAUGE, WIDTH)
+    lines = build_centerlines(rails, Parameters(GAUGE, WIDTH))
     (found,) = measure_track_geometry(lines, rails, WIDTH)
     t = found.chainage_m
     assert found.track_id == lines[0].track_id
@@ -83,7 +84,7 @@ def test_a_scanned_track_is_measured_to_millimetres(stored):
     network = smooth_network(vectorize(rasterize(points.xyz, cell_size(GAUGE, WIDTH)), WIDTH), 0.8)
     network = refine(network, points, WIDTH)
     rails = elevate(network, near_lines(network.lines, points.xyz, WIDTH), 10)
-    lines = build_centerlines(rails, GAUGE, WIDTH)
+    lines = build_centerlines(rails, Parameters(GAUGE, WIDTH))
     if stored:
         rails, lines = thin(rails, 0.002, 0.002), thin(lines, 0.002, 0.002)
         rails = [replace(rail, support=None, gaps=NO_GAPS) for rail in rails]
@@ -210,7 +211,7 @@ def test_one_run_measures_every_track_of_every_class_on_request(monkeypatch):
 def test_points_of_stations_add_up_to_those_of_the_rails(step_m):
     left, right = curved_track().rails()
     rails = rail_lines(left, right, points=60)
-    (found,) = measure_track_geometry(build_centerlines(rails, GAUGE, WIDTH), rails, WIDTH, step_m)
+    (found,) = measure_track_geometry(build_centerlines(rails, Parameters(GAUGE, WIDTH)), rails, WIDTH, step_m)
     assert abs(found.points.sum() - 120) <= 1
 
 
@@ -219,5 +220,5 @@ def test_a_millimetre_does_not_make_a_radius_on_a_short_piece():
     sag = 0.001 * np.sin(np.pi * x / x[-1])  # versine 1 mm: a radius of 1.3 km
     left, right = (np.column_stack([x, sag + side * 0.5 * (GAUGE + WIDTH), 0 * x]) for side in (1, -1))
     rails = rail_lines(left, right)
-    (found,) = measure_track_geometry(build_centerlines(rails, GAUGE, WIDTH), rails, WIDTH)
+    (found,) = measure_track_geometry(build_centerlines(rails, Parameters(GAUGE, WIDTH)), rails, WIDTH)
     assert np.isnan(found.radius_m).all()

@@ -2,6 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from rail_extract.core.parameters import Parameters
 from rail_extract.core.rails import RailLine
 from rail_extract.core.tracks.pairing import (
     pair_rails,
@@ -9,6 +10,7 @@ from rail_extract.core.tracks.pairing import (
 from rail_extract.laboratory.curves import Element, trace, transition_curve
 
 GAUGE, WIDTH = 1.435, 0.072
+STANDARD = Parameters(GAUGE, WIDTH)
 SPACING = GAUGE + WIDTH
 
 
@@ -40,7 +42,7 @@ TRAM = trace([Element(10), Element(40, 1 / 25, 1 / 25), Element(10)])
 def test_two_rails_pair_along_their_whole_length_in_any_direction(curve, turned, order):
     lines = [line[::-1] if turn else line for line, turn in zip(tracks(curve, 0.0), turned)]
     rails = rails_of(*lines[::order])
-    (pair,) = pair_rails(rails, GAUGE, WIDTH)
+    (pair,) = pair_rails(rails, STANDARD)
     assert pair.length_m == pytest.approx(curve.length_m, abs=0.1)
     left, right = (rails[number].xyz[:, :2] for number in (pair.left, pair.right))
     start_left, start_right = (
@@ -57,7 +59,7 @@ def test_two_rails_pair_along_their_whole_length_in_any_direction(curve, turned,
 @pytest.mark.parametrize("distance", [3.5, 4.5])
 def test_rails_of_neighbouring_tracks_never_pair(distance):
     rails = rails_of(*tracks(CURVED, 0.0, distance, 2 * distance))
-    pairs = pair_rails(rails, GAUGE, WIDTH)
+    pairs = pair_rails(rails, STANDARD)
     assert sorted(tuple(sorted((pair.left, pair.right))) for pair in pairs) == [(0, 1), (2, 3), (4, 5)]
 
 
@@ -67,44 +69,37 @@ def test_rails_of_neighbouring_tracks_never_pair(distance):
 def test_inner_rails_of_neighbouring_tracks_at_gauge_make_no_track(curve, count, off):
     """As with trams in narrow streets, where the inner rails of neighbouring tracks are at gauge as well."""
     rails = rails_of(*tracks(curve, *((2 * SPACING + off) * np.arange(count))))
-    pairs = pair_rails(rails, GAUGE, WIDTH)
+    pairs = pair_rails(rails, STANDARD)
     found = sorted(tuple(sorted((pair.left, pair.right))) for pair in pairs)
     assert found == [(2 * number, 2 * number + 1) for number in range(count)]
 
 
 def test_a_rail_shared_by_two_tracks_belongs_to_both():
     rails = rails_of(*beside(STRAIGHT, 0.0, SPACING, 2 * SPACING))
-    assert len(pair_rails(rails, GAUGE, WIDTH)) == 2
+    assert len(pair_rails(rails, STANDARD)) == 2
 
 
 @pytest.mark.parametrize(("height", "count"), [(0.0, 1), (0.18, 1), (6.5, 0), (np.nan, 1)])
 def test_rails_on_two_levels_are_not_a_track(height, count):
     left, right = tracks(STRAIGHT, 0.0)
-    assert len(pair_rails([rail(left), rail(right, 2, z=height)], GAUGE, WIDTH)) == count
+    assert len(pair_rails([rail(left), rail(right, 2, z=height)], STANDARD)) == count
 
 
 @pytest.mark.parametrize(("widening", "count"), [(0.04, 1), (-0.04, 1), (0.06, 0), (-0.06, 0)])
 def test_rails_pair_within_the_tolerance_of_the_gauge(widening, count):
     rails = rails_of(*tracks(STRAIGHT, 0.0, spacing=SPACING + widening))
-    assert len(pair_rails(rails, GAUGE, WIDTH)) == count
+    assert len(pair_rails(rails, STANDARD)) == count
 
 
 def test_dual_gauge_pairs_by_gauge():
     rails = rails_of(*beside(STRAIGHT, 0.0, -(1.0 + WIDTH), -SPACING))
-    assert [(p.left, p.right) for p in pair_rails(rails, GAUGE, WIDTH)] == [(0, 2)]
-    assert [(p.left, p.right) for p in pair_rails(rails, 1.0, WIDTH)] == [(0, 1)]
+    assert [(p.left, p.right) for p in pair_rails(rails, STANDARD)] == [(0, 2)]
+    assert [(p.left, p.right) for p in pair_rails(rails, Parameters(1.0, WIDTH))] == [(0, 1)]
 
 
 def test_rails_of_different_classes_do_not_pair():
     rails = rails_of(*tracks(STRAIGHT, 0.0))
-    assert pair_rails([rails[0], replace(rails[1], class_code=11)], GAUGE, WIDTH) == ()
-
-
-def test_long_rails_pair_in_parts_that_cover_them():
-    curve = trace([Element(1500.0, 1 / 5000, 1 / 5000)], step_m=0.1)
-    pairs = pair_rails(rails_of(*tracks(curve, 0.0)), GAUGE, WIDTH)
-    assert len(pairs) == 2
-    assert sum(pair.length_m for pair in pairs) == pytest.approx(1500.0, abs=3.0)
+    assert pair_rails([rails[0], replace(rails[1], class_code=11)], STANDARD) == ()
 
 
 def wandering(rng, curve, offset, sigma_m):
@@ -123,7 +118,7 @@ def test_the_edge_of_a_cable_trough_is_no_partner(seed, widening, side):
     spacing = SPACING + widening
     edge = wandering(rng, CURVED, side * (spacing / 2 + 1.475), 0.006)
     lines = [*tracks(CURVED, 0.0, spacing=spacing), edge]
-    (pair,) = pair_rails(rails_of(*lines), GAUGE, WIDTH)
+    (pair,) = pair_rails(rails_of(*lines), STANDARD)
     assert {pair.left, pair.right} == {0, 1}
 
 
@@ -133,6 +128,6 @@ def test_wandering_lines_on_both_sides_do_not_make_the_track_between_them_a_ghos
     edges = [
         wandering(rng, CURVED, side * (SPACING / 2 + 1.475), sigma_m) for side, sigma_m in ((1, 0.02), (-1, 0.006))
     ]
-    pairs = pair_rails(rails_of(*tracks(CURVED, 0.0), *edges), GAUGE, WIDTH)
+    pairs = pair_rails(rails_of(*tracks(CURVED, 0.0), *edges), STANDARD)
     assert {frozenset((pair.left, pair.right)) for pair in pairs} == {frozenset((0, 1))}
     assert sum(pair.length_m for pair in pairs) == pytest.approx(CURVED.length_m, abs=0.5)

@@ -149,24 +149,21 @@ def with_gap(line, start, length):
     return [line[t <= start], line[t >= start + length]]
 
 
-@pytest.mark.parametrize("radius", [25, 190, 1e9])
-@pytest.mark.parametrize("gap", [0.3, 1.5, 4.0])
-def test_gaps_are_bridged_along_the_curve(radius, gap):
-    truth = arc(24, radius)
-    (line,) = smoothed(draw(with_gap(truth, 10, gap)))
-    assert offsets(line, truth).max() < 0.02
+def reverse(length, first, second):
+    return trace([Element(length, first, first), Element(20, second, second)], (0.0, 0.0), 0.4).xy
 
 
-def test_a_gap_in_a_reverse_curve_is_bridged():
-    truth = trace([Element(20, 1 / 190, 1 / 190), Element(20, -1 / 190, -1 / 190)], (0.0, 0.0), 0.4).xy
-    (line,) = smoothed(draw(with_gap(truth, 18, 4)))
-    assert offsets(line, truth).max() < 0.02
-
-
-def test_a_gap_where_a_tram_enters_a_sharp_curve_is_bridged():
-    truth = trace([Element(20), Element(20, -1 / 30, -1 / 30)], (0.0, 0.0), 0.4).xy
-    (line,) = smoothed(draw(with_gap(truth, 18, 4)))
-    assert offsets(line, truth).max() < 0.05
+@pytest.mark.parametrize(
+    ("truth", "start", "gap", "off_m"),
+    [
+        *((arc(24, radius), 10, gap, 0.02) for radius in (25, 190, 1e9) for gap in (0.3, 1.5, 4.0)),
+        (reverse(20, 1 / 190, -1 / 190), 18, 4, 0.02),
+        (reverse(20, 0.0, -1 / 30), 18, 4, 0.05),  # a tram enters a sharp curve
+    ],
+)
+def test_gaps_are_bridged_along_the_curve(truth, start, gap, off_m):
+    (line,) = smoothed(draw(with_gap(truth, start, gap)))
+    assert offsets(line, truth).max() < off_m
 
 
 def test_gaps_longer_than_allowed_stay():

@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from rail_extract.core.heads.blunt import Ridge, wander
+from rail_extract.core.heads.edgeless import Ridge, wander
 from rail_extract.core.heads.head_points import HeadPoints, stations_along
 from scipy.ndimage import gaussian_filter1d
 

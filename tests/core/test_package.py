@@ -1,12 +1,17 @@
-"""The examples in the docstrings of the core run and give what they show."""
+"""The core as a package: all of it is distributed, and the examples in its docstrings give what they show."""
 
+import ast
 import doctest
 import importlib
 import importlib.util
 import pkgutil
+import re
+from pathlib import Path
 
 import pytest
 import rail_extract.core
+
+ROOT = Path(__file__).resolve().parents[2]
 
 MODULES = [
     "rail_extract",
@@ -29,3 +34,12 @@ def test_examples_give_what_they_show(name):
 def test_the_front_door_has_an_example():
     assert has_examples("rail_extract.core")
     assert has_examples("rail_extract.core.front")
+
+
+def test_every_package_is_distributed():
+    listed = re.search(r"^packages = (\[.*?^\])", (ROOT / "pyproject.toml").read_text(encoding="utf-8"), re.M | re.S)
+    folders = {path.parent for path in (ROOT / "core").rglob("*.py")}
+    packages = {
+        ".".join(("rail_extract", *folder.relative_to(ROOT).parts)) for folder in (ROOT, ROOT / "models", *folders)
+    }
+    assert ast.literal_eval(listed[1]) == sorted(packages)

@@ -1,4 +1,4 @@
-"""The command `classify`: it writes classified copies; and extraction from a raw cloud."""
+"""The commands `classify` and `grow`: they write classified copies; and extraction from a raw cloud."""
 
 import json
 
@@ -14,15 +14,20 @@ from rail_extract.core.standards import SEARCHED_CLASSES
 from rail_extract.core.tasks import InTurn
 from rail_extract.core.workers import runner
 from rail_extract.laboratory.scenes.raw_shapes import MIDDLE, flat, rough, with_track
+from rail_extract.laboratory.scenes.raw_strips import SPACING_M, strip
 
 CORNER = np.array([500_000.0, 5_000_000.0, 100.0])
+STRIP = strip(14.0)
+X, Y = CORNER[:2] + STRIP.at(7.0, SPACING_M / 2)
 
 
 @pytest.fixture
 def save(tmp_path):
-    def save(xyz, name="raw.laz"):
+    def save(xyz, name="raw.laz", crs=None):
         header = laspy.LasHeader(point_format=6, version="1.4")
         header.scales, header.offsets = [0.0005] * 3, CORNER
+        if crs:
+            header.add_crs(pyproj.CRS(crs))
         cloud = laspy.LasData(header)
         cloud.x, cloud.y, cloud.z = (xyz + CORNER).T
         cloud.write(tmp_path / name)
@@ -67,18 +72,6 @@ def test_workers_change_nothing(save, tmp_path, monkeypatch):
     for count in ("1", "2"):
         assert main(["classify", source, "--output", str(tmp_path / f"{count}.las"), "--workers", count]) == 0
     assert (tmp_path / "1.las").read_bytes() == (tmp_path / "2.las").read_bytes()
-
-
-@pytest.mark.parametrize("count", ["-1", "1001"])
-def test_a_number_of_workers_that_no_computer_has_is_refused(count, save, tmp_path, capsys):
-    options = ["--output", str(tmp_path / "new.las"), "--workers", count]
-    assert main(["classify", str(save(scene()[0])), *options]) == 1
-    assert f"--workers must be a number from 0 to 1000, not {count}." in capsys.readouterr().err
-
-
-def test_a_class_out_of_range_is_refused(save, tmp_path, capsys):
-    assert main(["classify", str(save(scene()[0])), "--output", str(tmp_path / "o.las"), "--rail-class", "256"]) == 1
-    assert "--rail-class must be a number from 0 to 255, not 256." in capsys.readouterr().err
 
 
 def test_rails_are_extracted_from_a_raw_cloud(save, tmp_path):
@@ -155,16 +148,97 @@ def test_a_guide_across_the_tracks_is_noticed(save, tmp_path, capsys):
     ("options", "message"),
     [
         (["--only-guided"], "--only-guided needs lines to compare tracks with: give --guide."),
+        (["--workers", "-1"], "--workers must be a number from 0 to 1000, not -1."),
+        (["--workers", "1001"], "--workers must be a number from 0 to 1000, not 1001."),
+        (["--rail-class", "256"], "--rail-class must be a number from 0 to 255, not 256."),
         (["--guide", "nothing.json"], "nothing.json can't be read as a vector file: give a GeoPackage or GeoJSON"),
         (["--guide", "far.json"], "The guide has no line within 4 m of the cloud: check its place and coordinate"),
         (["--guide", "empty.json"], "empty.json has no lines: give lines along the tracks."),
     ],
 )
-def test_guides_that_can_t_be_used_are_refused(save, tmp_path, capsys, monkeypatch, options, message):
+def test_each_mistake_of_a_search_gets_a_sentence(save, tmp_path, capsys, monkeypatch, options, message):
     monkeypatch.chdir(tmp_path)
     geojson(tmp_path / "far.json", along_track(50.0))
     (tmp_path / "empty.json").write_text('{"type": "FeatureCollection", "features": []}')
     options = ["--output", str(tmp_path / "new.las"), "--crs", "EPSG:32632", *options]
     assert main(["classify", str(save(scene()[0])), *options]) == 1
+    assert message in capsys.readouterr().err
+    assert not (tmp_path / "new.las").exists()
+
+
+@pytest.fixture
+def raw(save):
+    return str(save(STRIP.xyz, "raw.las", 25832))
+
+
+def test_a_copy_has_the_rail_that_grew_from_a_seed(raw, tmp_path, capsys):
+    new = tmp_path / "out" / "new.las"
+    assert main(["grow", raw, "--output", str(new), "--seed", f"{X},{Y}", "--rail-class", "20", "--single"]) == 0
+    found = np.asarray(laspy.read(new).classification) == 20
+    left = STRIP.head & (STRIP.xyz[:, 1] > 0)
+    assert (found & left).sum() > 0.94 * left.sum()
+    assert not found[STRIP.xyz[:, 1] < 0].any()
+    said = capsys.readouterr()
+    assert f"{found.sum()} of {len(found)} points are on rails" in said.out
+    assert "where the cloud ends" in said.err
+
+
+def test_seeds_of_a_file_are_transformed(raw, tmp_path):
+    pytest.importorskip("pyogrio")
+    longitude, latitude = pyproj.Transformer.from_crs(25832, 4326, always_xy=True).transform(X, Y)
+    point = {"type": "Feature", "properties": {}, "geometry": {"type": "Point", "coordinates": [longitude, latitude]}}
+    (tmp_path / "seeds.geojson").write_text(json.dumps({"type": "FeatureCollection", "features": [point]}))
+    new = tmp_path / "new.las"
+    assert main(["grow", raw, "--output", str(new), "--seeds", str(tmp_path / "seeds.geojson")]) == 0
+    assert (laspy.read(new).classification == 10).sum() > 0.9 * STRIP.head.sum()
+
+
+@pytest.mark.parametrize("name", ["stops.gpkg", "stops.csv"])
+def test_stops_are_written_with_their_reason(raw, tmp_path, name):
+    pyogrio, shapely = pytest.importorskip("pyogrio"), pytest.importorskip("shapely")
+    stops = tmp_path / "out" / name
+    values = ["grow", raw, "--output", str(tmp_path / "new.las"), "--seed", f"{X},{Y}", "--stops", str(stops)]
+    assert main(values) == 0
+    _, _, shapes, columns = pyogrio.raw.read(stops)
+    places = shapely.get_coordinates(shapely.from_wkb(shapes), include_z=True)
+    assert sorted(places[:, 0]) == pytest.approx([500_000.0, 500_014.0], abs=1.0)
+    assert places[:, 1] == pytest.approx(Y, abs=0.02)
+    assert columns[-2].tolist() == [1, 2]
+    assert columns[-1].tolist() == ["the cloud ends"] * 2
+
+
+def test_rails_grow_and_are_extracted_in_one_call(save, tmp_path):
+    """Of two tracks, only the one with the seed."""
+    lefts = np.array([0.5, -0.5, 3.5, 2.5]) * SPACING_M
+    rails = [lambda along, left=left: np.full_like(along, left) for left in lefts]
+    tracks = strip(16.0, rails=rails, per_m2=800, half_width_m=6.0)
+    request = ask([save(tracks.xyz, "two.las")], SEARCHED_CLASSES)
+    seeds = [np.atleast_2d(CORNER[:2] + tracks.at(8.0, lefts[0]))]
+    parameters = Parameters(1.435, 0.072, passes=1, engine="OPENCV")
+    folder = tmp_path / "work"
+    folder.mkdir()
+    network = extract_files(request, folder, parameters, InTurn(), seeds=seeds)
+    assert [rail.length_m for rail in network.rails] == pytest.approx([15.5, 15.5], abs=0.6)
+    middles = sorted(float(np.median(network.frame.to_crs(rail.xyz)[:, 1])) - CORNER[1] for rail in network.rails)
+    assert middles == pytest.approx([-SPACING_M / 2, SPACING_M / 2], abs=0.01)
+    assert network.search.paired_m == pytest.approx(32, abs=2)
+    assert not list(folder.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ([], "A rail is followed from seeds: give --seeds or --seed."),
+        (["--seed", "5"], '--seed "5" should be two numbers: x,y.'),
+        (["--seed", "nan,5"], '--seed "nan,5" should be two numbers: x,y.'),
+        (["--seed", "1e300,5"], '--seed "1e300,5" should be two numbers: x,y.'),
+        (["--seed", "1,2"], "No seed is in the cloud"),
+        (["--seed", f"{X},{Y}", "--max-outliers", "-1"], "--max-outliers must be 0 or more, not -1."),
+        (["--seed", f"{X},{Y}", "--stops", "a.shp"], "The option --stops writes .gpkg files: give a.shp this suffix."),
+        (["--seed", f"{X},{Y}", "--rail-class", "300"], "--rail-class must be a number from 0 to 255, not 300."),
+    ],
+)
+def test_each_mistake_of_a_growth_gets_a_sentence(raw, tmp_path, capsys, options, message):
+    assert main(["grow", raw, "--output", str(tmp_path / "new.las"), *options]) == 1
     assert message in capsys.readouterr().err
     assert not (tmp_path / "new.las").exists()
