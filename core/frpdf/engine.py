@@ -260,7 +260,7 @@ def make_engine(arrays: dict[str, np.ndarray], engine: str = AUTO, device: str =
     Parameters
     ----------
     arrays : dict
-        Weights, from `models.load_arrays`.
+        Weights, from `weights.load_arrays`.
     engine : {"AUTO", "TORCH", "OPENCV"}
     device : {"AUTO", "CPU", "CUDA"}
 

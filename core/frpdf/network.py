@@ -168,7 +168,7 @@ def feedback(logits: Tensor) -> Tensor:
 
 
 def weights_of(network: nn.Module) -> dict[str, np.ndarray]:
-    """Return parameters and batch statistics as float32 arrays, as `models.save_arrays` takes them."""
+    """Return parameters and batch statistics as float32 arrays, as `weights.save_arrays` takes them."""
     return {
         name: value.detach().cpu().float().contiguous().numpy()
         for name, value in network.state_dict().items()

@@ -30,7 +30,7 @@ class TorchEngine(Engine):
         Parameters
         ----------
         arrays : dict
-            Weights, from `models.load_arrays`.
+            Weights, from `weights.load_arrays`.
         device : {"AUTO", "CPU", "CUDA"}
         exact : bool
             Compute in float32 on every device.

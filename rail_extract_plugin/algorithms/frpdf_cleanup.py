@@ -78,7 +78,7 @@ class FrpdfCleanup(RailAlgorithm):
         """Clean each band, then write the file."""
         from ...core.frpdf.cleanup import clean
         from ...core.frpdf.engine import make_engine
-        from ...core.frpdf.models import load_arrays
+        from ...core.frpdf.weights import load_arrays
         from ..reading.geotiff import read_rasters
 
         engine = make_engine(load_arrays(job.model.path), values.choice("ENGINE"), values.choice("DEVICE"))

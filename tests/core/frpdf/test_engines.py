@@ -7,7 +7,8 @@ import pytest
 from rail_extract.core.clouds.points import RailPoints, read_rail_points
 from rail_extract.core.frpdf.cleanup import clean
 from rail_extract.core.frpdf.engine import make_engine
-from rail_extract.core.frpdf.models import MODELS, load_arrays
+from rail_extract.core.frpdf.models import MODELS
+from rail_extract.core.frpdf.weights import load_arrays
 from rail_extract.core.pipeline import Parameters
 from rail_extract.core.raster import cell_size, rasterize
 from rail_extract.core.squares.steps import lines_of

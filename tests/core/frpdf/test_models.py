@@ -6,7 +6,8 @@ import zipfile
 import numpy as np
 import pytest
 from rail_extract.core.errors import ModelError
-from rail_extract.core.frpdf.models import AUTOMATIC, MAX_BYTES, MODELS, choose, load_arrays, save_arrays
+from rail_extract.core.frpdf.models import AUTOMATIC, MODELS, choose
+from rail_extract.core.frpdf.weights import MAX_BYTES, load_arrays, save_arrays
 
 
 @pytest.mark.parametrize("standard", [(1.435, 0.0762), (1.0, 0.06191), (1.676, 0.0667)])

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from rail_extract.core.frpdf.cleanup import clean
 from rail_extract.core.frpdf.engine import make_engine
-from rail_extract.core.frpdf.models import MODELS, load_arrays
+from rail_extract.core.frpdf.models import MODELS
+from rail_extract.core.frpdf.weights import load_arrays
 from rail_extract.core.raster import RailRaster
 from rail_extract.laboratory.rasters.pairs import BASE_RATIO, CELL_M, random_pair
 from rail_extract.laboratory.training.scores import Scores, score
