@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from qgis.core import QgsApplication, QgsProcessingModelAlgorithm
 
-from .i18n import tr
 from .paths import MODEL
 from .toolbox_action import ToolboxAction
 
@@ -13,7 +12,7 @@ class OpenModelAction(ToolboxAction):
     """Opens a copy of the model: saving it asks for a name, so the plugin's own file stays unchanged."""
 
     def __init__(self) -> None:
-        super().__init__(tr("Open as Model…"))
+        super().__init__("Open as Model…")
 
     def execute(self) -> None:
         """Open the model designer."""

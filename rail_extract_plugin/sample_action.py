@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from .i18n import tr
 from .paths import SAMPLE
 from .toolbox_action import ToolboxAction
 
@@ -14,7 +13,7 @@ class OpenSampleAction(ToolboxAction):
     """Opens the dialog with the sample; it is in the toolbox's context menu and in the menu of the plugin."""
 
     def __init__(self) -> None:
-        super().__init__(tr("Open the Sample…"))
+        super().__init__("Open the Sample…")
 
     def execute(self) -> None:
         """Open the dialog."""

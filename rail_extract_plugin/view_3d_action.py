@@ -7,9 +7,7 @@ from typing import Any
 
 from qgis.core import QgsVector3D, QgsVectorLayer
 
-from .i18n import tr
-
-NAME = tr("Show Lines in 3D")
+NAME = "Show Lines in 3D"
 
 TILT_DEG = 45.0
 """Angle between the view and the vertical: plan and heights are both seen."""
@@ -28,7 +26,7 @@ def show_in_3d(iface: Any) -> None:
     layer = iface.activeLayer()
     heights = _heights(layer) if isinstance(layer, QgsVectorLayer) else []
     if not heights:
-        iface.messageBar().pushWarning(NAME, tr("Select a layer of 3D lines first, such as rails or centerlines."))
+        iface.messageBar().pushWarning(NAME, "Select a layer of 3D lines first, such as rails or centerlines.")
         return
     extent = iface.mapCanvas().mapSettings().layerExtentToOutputExtent(layer, layer.extent())
     extent.scale(ROOM)

@@ -11,7 +11,6 @@ from qgis.PyQt.QtCore import QObject
 from qgis.PyQt.QtWidgets import QPushButton
 
 from .algorithms.extract_rails import ExtractRails
-from .i18n import tr
 from .notices import notices
 from .runs.missing import open_installation
 from .setup.dependencies import Package, missing_packages
@@ -49,10 +48,10 @@ class Welcome(QObject):
         QgsSettings().setValue(SHOWN, step)
         self._close()
         if missing:
-            self._push(_what_is_missing(missing), tr("Install packages…"), open_installation)
+            self._push(_what_is_missing(missing), "Install packages…", open_installation)
         else:
-            text = tr("Ready: the sample shows what the plugin does.")
-            self._push(text, tr("Open the sample…"), self._open_sample)
+            text = "Ready: the sample shows what the plugin does."
+            self._push(text, "Open the sample…", self._open_sample)
 
     def remove(self) -> None:
         """Take the message away."""
@@ -62,7 +61,7 @@ class Welcome(QObject):
 
     def _push(self, text: str, label: str, do: Callable[[], None]) -> None:
         """Show a message with a button."""
-        self._item, button = self._bar.createMessage(tr("Rail Extract"), text), QPushButton(label)
+        self._item, button = self._bar.createMessage("Rail Extract", text), QPushButton(label)
 
         def follow() -> None:
             self._close()
@@ -81,4 +80,4 @@ class Welcome(QObject):
 
 def _what_is_missing(missing: tuple[Package, ...]) -> str:
     names = ", ".join(package.module for package in missing)
-    return tr("To work, the plugin needs Python packages that this QGIS does not have: {}.").format(names)
+    return f"To work, the plugin needs Python packages that this QGIS does not have: {names}."

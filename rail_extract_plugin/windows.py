@@ -15,7 +15,6 @@ from qgis.PyQt.QtWidgets import QAction, QDockWidget, QToolBar
 
 from . import compat
 from .dialog.guide import guide
-from .i18n import tr
 from .links import links
 from .model_action import OpenModelAction
 from .notices import notices
@@ -71,8 +70,8 @@ class Windows(QObject):
     def _add_to(self, iface) -> None:
         """Add the menu and, if the package that it needs is installed, the dock."""
         self._entries = [
-            self._entry(tr("Extract Rails…"), lambda: self._open("extractrails")),
-            self._entry(tr("Classify Rail Points…"), lambda: self._open("classifyrailpoints")),
+            self._entry("Extract Rails…", lambda: self._open("extractrails")),
+            self._entry("Classify Rail Points…", lambda: self._open("classifyrailpoints")),
         ]
         if is_installed("numpy"):
             dock = self._add_dock(iface)
@@ -81,8 +80,8 @@ class Windows(QObject):
             self._entries.append(self._entry(NAME, lambda: show_in_3d(iface)))
         self._entries += [
             self._entry(self._actions[0].name, notices.sample_wanted.emit),
-            self._entry(tr("Install Packages…"), open_installation),
-            self._entry(tr("Help"), lambda: QDesktopServices.openUrl(QUrl(guide("tutorial")))),
+            self._entry("Install Packages…", open_installation),
+            self._entry("Help", lambda: QDesktopServices.openUrl(QUrl(guide("tutorial")))),
         ]
         for entry in self._entries:
             iface.addPluginToMenu(MENU, entry)
@@ -121,7 +120,7 @@ class Windows(QObject):
         iface.initializationCompleted.connect(self._hide_if_empty)
         notices.findings_loaded.connect(self._show_findings)
         review = self.dock.toggleViewAction()
-        review.setText(tr("Review Findings"))
+        review.setText("Review Findings")
         return review
 
     def _add_toolbar(self, iface) -> QAction:

@@ -43,6 +43,7 @@ from rail_extract.core.standards import SEARCHED_CLASSES, resolve
 from rail_extract.core.tasks import InTurn
 from rail_extract.rail_extract_plugin.algorithms.frpdf_cleanup import FrpdfCleanup
 from rail_extract.rail_extract_plugin.algorithms.vectorize_rails import VectorizeRails
+from rail_extract.rail_extract_plugin.dialog.parameter_values import ParameterValues
 from rail_extract.rail_extract_plugin.writing.layers import write_layer as write_output
 from rail_extract.rail_extract_plugin.writing.layers import write_raster
 
@@ -66,7 +67,7 @@ def write_layer(destination: Destination, version: int) -> None:
     """Write rails whose number and place are the version."""
     xyz = np.array([[version, 0.0, version], [version, 10.0, version]], dtype=float)
     made = lines_layer(RAILS, [RailLine(xyz, version, 10, version, 1.0, 1.0, 0.0) for _ in range(COUNT)])
-    _write(VectorizeRails(), destination, lambda *rest: write_output(rest[0], "OUTPUT", made, FRAME, *rest[1:]))
+    _write(VectorizeRails(), destination, lambda values: write_output(values, "OUTPUT", made, FRAME))
 
 
 def read_layer(path: Path) -> set[int]:
@@ -109,7 +110,7 @@ def write_cells(destination: Destination, version: int) -> None:
     standard = resolve("CUSTOM", 1435.0, 72.0)
     raster = rasterize(points, 0.04)
     header = header_for([raster], (10 + version % 50,), FRAME, standard)
-    _write(FrpdfCleanup(), destination, lambda *rest: write_raster(rest[0], "OUTPUT", header, [raster], *rest[1:]))
+    _write(FrpdfCleanup(), destination, lambda values: write_raster(values, "OUTPUT", header, [raster]))
 
 
 def read_cells(path: Path) -> set[int]:
@@ -196,12 +197,11 @@ SETS = (".shp", ".gml", ".csv", ".vpc")
 """Suffixes of outputs of several files, whose main file or folder is absent for a moment."""
 
 
-def _write(algorithm: Any, destination: Destination, write: Callable[..., Any]) -> None:
+def _write(algorithm: Any, destination: Destination, write: Callable[[ParameterValues], Any]) -> None:
     """Write an output as the algorithm does."""
-    context = QgsProcessingContext()
     algorithm.initAlgorithm()
     algorithm.destinations = {"OUTPUT": destination}
-    write(algorithm, {"OUTPUT": str(destination.path)}, context)
+    write(ParameterValues(algorithm, {"OUTPUT": str(destination.path)}, QgsProcessingContext()))
 
 
 def elsewhere(call: Callable[[], set[int] | None]) -> set[int]:

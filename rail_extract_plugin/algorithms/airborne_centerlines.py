@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from qgis.core import QgsProcessingContext
-
 from ...core.errors import ParameterError
 from ...core.fields import AIRBORNE, PROPOSED
 from ...core.parameters import AirborneParameters
@@ -14,10 +12,9 @@ from ...core.progress import Estimating, Progress
 from ...core.standards import SEARCHED_CLASSES, RailStandard
 from ..dialog import inputs, outputs
 from ..dialog import parameters as groups
+from ..dialog.definitions import Definitions
 from ..dialog.parameter_values import ParameterValues, class_numbers
-from ..dialog.passwords import masked
 from ..reading.clouds import CloudSource, points_folder, request_points
-from ..writing.destinations import is_wanted
 from ..writing.layers import figures_of, layer_writers, write_layer
 from ..writing.reports import write_shown
 from ..writing.run import properties_of
@@ -63,9 +60,9 @@ class AirborneCenterlines(RailAlgorithm):
         "proposed, and run again with them."
     )
 
-    def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:
-        """Declare the parameters and outputs in the order of the interface."""
-        for definition in (
+    def definitions(self) -> Definitions:
+        """Return the parameters and outputs in the order of the interface."""
+        return (
             *inputs.airborne_cloud(),
             inputs.tracks_meant(),
             *groups.rail(),
@@ -76,33 +73,27 @@ class AirborneCenterlines(RailAlgorithm):
             outputs.further(outputs.airborne_stations()),
             outputs.further(outputs.findings()),
             outputs.further(outputs.proposed_guides()),
-        ):
-            self.addParameter(definition)
-        self._add_report(outputs.report())
-        for output in outputs.airborne_figures():
-            self.addOutput(output)
+            outputs.report(),
+            *outputs.airborne_figures(),
+        )
 
-    def read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Job:
+    def read(self, values: ParameterValues) -> Job:
         """Read and check the parameters, in the main thread."""
-        values = ParameterValues(self, parameters, context)
         standard, cloud, classes = values.standard(), values.cloud("INPUT"), values.text("CLASSES").strip()
         codes = class_numbers(classes, "CLASSES") if classes else SEARCHED_CLASSES
-        command = masked(self.asPythonCommand(parameters, context))
+        command = values.command()
         guides = values.tracks_meant(cloud)
-        if not guides and not is_wanted(parameters.get("PROPOSED"), context):
+        if not guides and not values.wanted("PROPOSED"):
             raise ParameterError("GUIDE is empty: choose lines along the tracks, or PROPOSED to have some proposed.")
         return Job(cloud, codes, standard, values.airborne(standard), guides, command)
 
-    def compute(
-        self, job: Job, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
-    ) -> dict[str, Any]:
+    def compute(self, job: Job, values: ParameterValues, progress: Progress) -> dict[str, Any]:
         """Fit the tracks, or propose guides where there are none, then write the outputs."""
         from ...core.airborne.files import survey_files
         from ...core.airborne.proposals import propose_guides
         from ...core.airborne.run import Run
 
         progress = Estimating(progress)
-        values = ParameterValues(self, parameters, context)
         request = request_points(job.cloud, job.class_codes, values.extent, progress)
         with values.runner() as runner, points_folder() as folder:
             run = Run(request, job.parameters, folder / "points", runner, progress)
@@ -110,49 +101,37 @@ class AirborneCenterlines(RailAlgorithm):
         progress.check()
         self.layer_properties = properties_of(job.cloud, job.class_codes, job.standard.head_width_m, found.frame)
         write = self._write_survey if job.guides else self._write_proposals
-        return write(found, job, parameters, context, progress)
+        return write(found, job, values, progress)
 
     def _write_proposals(
-        self,
-        found: Proposals,
-        job: Job,
-        parameters: dict[str, Any],
-        context: QgsProcessingContext,
-        progress: Progress,
+        self, found: Proposals, job: Job, values: ParameterValues, progress: Progress
     ) -> dict[str, Any]:
         """Write the proposed guides."""
         from ...core.output.layers import lines_layer
 
         progress.info(found.summary)
         guides = lines_layer(PROPOSED, found.guides)
-        written = write_layer(self, "PROPOSED", guides, found.frame, parameters, context)
+        written = write_layer(values, "PROPOSED", guides, found.frame)
         return {**written, "PROPOSED_LENGTH": found.length_m, "DENSITY": round(found.density, 1)}
 
-    def _write_survey(
-        self,
-        survey: Survey,
-        job: Job,
-        parameters: dict[str, Any],
-        context: QgsProcessingContext,
-        progress: Progress,
-    ) -> dict[str, Any]:
+    def _write_survey(self, survey: Survey, job: Job, values: ParameterValues, progress: Progress) -> dict[str, Any]:
         """Write what was found along the guides."""
         from ...core.output.layers import airborne_stations_layer, findings_layer, lines_layer
         from ...core.report.airborne import airborne_findings, airborne_summary
 
         for sentence in airborne_summary(survey):
             progress.info(sentence)
-        frame, rest = survey.frame, (parameters, context)
+        frame = survey.frame
         makers = {
             "CENTERLINES": lambda: lines_layer(AIRBORNE, survey.lines),
             "STATIONS": lambda: airborne_stations_layer(survey.tracks),
             "FINDINGS": lambda: findings_layer(airborne_findings(survey)),
         }
         writers = {
-            **layer_writers(self, makers, frame, *rest),
-            "REPORT": lambda: write_shown(self, "REPORT", lambda: _page(job, survey), *rest),
+            **layer_writers(values, makers, frame),
+            "REPORT": lambda: write_shown(values, lambda: _page(job, survey)),
         }
-        written = write_each(writers, parameters, context)
+        written = write_each(writers, values)
         lengths_m = {"GUIDE_LENGTH": survey.guides_m, "SEEN_LENGTH": survey.seen_m, "DENSITY": round(survey.density, 1)}
         return {**written, **figures_of(survey.lines, "CENTERLINE"), **lengths_m}
 

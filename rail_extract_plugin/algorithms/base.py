@@ -11,6 +11,7 @@ from qgis.core import (
     QgsProcessingContext,
     QgsProcessingException,
     QgsProcessingFeedback,
+    QgsProcessingOutputDefinition,
     QgsProcessingOutputFile,
     QgsProcessingParameterDefinition,
     QgsProcessingParameterFeatureSink,
@@ -23,12 +24,12 @@ from ...core.fields import Field
 from ...core.kernels import blas, one_thread
 from ...core.progress import Progress
 from ..dialog.checks import check_values, explain_invalid
+from ..dialog.definitions import Definitions
 from ..dialog.guide import guide
 from ..dialog.help_panel import help_panel
 from ..dialog.parameter_values import ParameterValues
 from ..dialog.wording import WITH_DIALOGS, for_user
 from ..feedback import QgisProgress
-from ..i18n import tr
 from ..notices import notices
 from ..paths import ICONS, PICTURES
 from ..runs.missing import with_link
@@ -63,8 +64,8 @@ ALIGNMENT_WORDS = ("alignment", "elements", "straight", "clothoid", "arc", "Tras
 class RailAlgorithm(QgsProcessingAlgorithm):
     """An algorithm of Rail Extract in the toolbox.
 
-    A subclass states its name and its needs in the class attributes, declares its parameters in `initAlgorithm`, reads
-    them in `read` and computes in `compute`. Modules that depend on `NEEDS` are imported inside these two only.
+    A subclass states its name and its needs in the class attributes, its parameters in `definitions`, reads them in
+    `read` and computes in `compute`. Modules that depend on `NEEDS` are imported inside these two only.
     """
 
     NAME = ""
@@ -87,7 +88,23 @@ class RailAlgorithm(QgsProcessingAlgorithm):
     layer_properties: Mapping[str, str] = NO_PROPERTIES
     """What the layers of a run remember of it; see `writing.run`."""
 
-    def read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Any:
+    def definitions(self) -> Definitions:
+        """Return the parameters and outputs in the order of the interface."""
+        raise NotImplementedError
+
+    def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:
+        """Declare the parameters and outputs."""
+        for definition in self.definitions():
+            if isinstance(definition, QgsProcessingOutputDefinition):
+                self.addOutput(definition)
+            elif _is_page(definition):
+                # Declared as a file: the batch dialog of several QGIS versions never ends after a web page.
+                self.addParameter(definition, False)
+                self.addOutput(QgsProcessingOutputFile(definition.name(), definition.description()))
+            else:
+                self.addParameter(definition)
+
+    def read(self, values: ParameterValues) -> Any:
         """Read and check the parameters in the main thread, and return what `compute` needs.
 
         Raises
@@ -97,16 +114,14 @@ class RailAlgorithm(QgsProcessingAlgorithm):
         """
         raise NotImplementedError
 
-    def compute(self, job: Any, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress) -> dict:
+    def compute(self, job: Any, values: ParameterValues, progress: Progress) -> dict[str, Any]:
         """Compute, write the outputs and return the results by name.
 
         Parameters
         ----------
         job : object
             What `read` returned.
-        parameters : dict
-            Values by name, as QGIS passes them.
-        context : QgsProcessingContext
+        values : ParameterValues
         progress : Progress
         """
         raise NotImplementedError
@@ -156,10 +171,10 @@ class RailAlgorithm(QgsProcessingAlgorithm):
     ) -> dict:
         """Compute in any thread; every error becomes one sentence."""
         progress = QgisProgress(feedback, self.parameterDefinitions())
-        progress.status(tr("Loading packages"))  # the first run of a session takes a second or two for it
+        progress.status("Loading packages")  # the first run of a session takes a second or two for it
         try:
             with running(feedback), one_thread(*blas()):
-                results = self.compute(self._job, parameters, context, progress)
+                results = self.compute(self._job, ParameterValues(self, parameters, context), progress)
         except BaseException as error:
             reason = sentence_for(error, self.parameterDefinitions())
             notices.run_failed.emit(feedback, type(error))
@@ -169,25 +184,21 @@ class RailAlgorithm(QgsProcessingAlgorithm):
         # PyQt keeps what is raised here: with the error as its context, files that it refers to would stay open.
         raise QgsProcessingException(reason)
 
-    def _add_report(self, definition: QgsProcessingParameterDefinition) -> None:
-        """Declare a report as a file: the batch dialog of several QGIS versions never ends after a web page."""
-        self.addParameter(definition, False)
-        self.addOutput(QgsProcessingOutputFile(definition.name(), definition.description()))
-
     def _destinations(self, parameters: dict[str, Any], context: QgsProcessingContext) -> dict[str, Destination]:
         """Check the files of the outputs, and remember what they replace."""
         outputs = self.destinationParameterDefinitions()
         for output in outputs:
             if isinstance(output, QgsProcessingParameterFeatureSink):
                 check_layer_name(output.name(), parameters.get(output.name()), context)
-            elif output.defaultFileExtension() == PAGE:
+            elif _is_page(output):
                 check_page_name(output.name(), parameters.get(output.name()), context)
         return destinations({output.name(): parameters.get(output.name()) for output in outputs}, context)
 
     def _read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Any:
         """Check the values that need no file, then read the parameters."""
-        check_values(self.parameterDefinitions(), ParameterValues(self, parameters, context))
-        return self.read(parameters, context)
+        values = ParameterValues(self, parameters, context)
+        check_values(self.parameterDefinitions(), values)
+        return self.read(values)
 
     def _refusal(self, parameters: dict[str, Any], context: QgsProcessingContext) -> str | None:
         """Return what is wrong with the first input that QGIS does not accept."""
@@ -232,11 +243,11 @@ class RailAlgorithm(QgsProcessingAlgorithm):
 
     def displayName(self) -> str:
         """Return the label shown in the toolbox."""
-        return tr(self.LABEL)
+        return self.LABEL
 
     def group(self) -> str:
         """Return the label of the group."""
-        return tr(self.GROUP.label)
+        return self.GROUP.label
 
     def groupId(self) -> str:
         """Return the identifier of the group."""
@@ -244,15 +255,15 @@ class RailAlgorithm(QgsProcessingAlgorithm):
 
     def tags(self) -> list[str]:
         """Return the search terms."""
-        return [tr(tag) for tag in self.TAGS]
+        return list(self.TAGS)
 
     def shortDescription(self) -> str:
         """Return the sentence of the tooltip."""
-        return tr(self.SUMMARY)
+        return self.SUMMARY
 
     def shortHelpString(self) -> str:
         """Return the text of the help panel; a command line prints no HTML, and the summary and parameters itself."""
-        summary, text = tr(self.SUMMARY), tr(self.HELP)
+        summary, text = self.SUMMARY, self.HELP
         if QgsApplication.platform() == COMMAND_LINE:
             return "\n\n".join((text, *(f"{field.name}: {field.meaning}." for field in self.FIELDS)))
         picture = PICTURES / self.PICTURE if self.PICTURE else None
@@ -269,3 +280,7 @@ class RailAlgorithm(QgsProcessingAlgorithm):
     def svgIconPath(self) -> str:
         """Return the path of the icon, where QGIS draws it itself."""
         return str(ICONS / f"{self.NAME}.svg")
+
+
+def _is_page(definition: QgsProcessingParameterDefinition) -> bool:
+    return definition.isDestination() and definition.defaultFileExtension() == PAGE

@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from qgis.core import QgsProcessingContext
-
 from ...core.progress import Progress
 from ...core.standards import Gauge, RailStandard
 from ..dialog import inputs, outputs
 from ..dialog import parameters as groups
+from ..dialog.definitions import Definitions
 from ..dialog.parameter_values import ParameterValues
-from ..writing.destinations import is_wanted
 from ..writing.layers import figures_of, write_layer
 from .base import RAIL_WORDS, TRACK_WORDS, RailAlgorithm
 from .toolbox_groups import STEPS
@@ -49,9 +47,9 @@ class BuildTrackCenterlines(RailAlgorithm):
         "or too low for a rail, compared with the tracks alongside, are left out of it."
     )
 
-    def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:
-        """Declare the parameters and outputs in the order of the interface."""
-        for definition in (
+    def definitions(self) -> Definitions:
+        """Return the parameters and outputs in the order of the interface."""
+        return (
             inputs.rails(),
             *groups.rail(),
             *groups.pairing(),
@@ -59,25 +57,18 @@ class BuildTrackCenterlines(RailAlgorithm):
             groups.smoothing_xy(),
             *groups.simplification(),
             groups.min_length(),
-        ):
-            self.addParameter(definition)
-        self.addParameter(outputs.centerlines())
-        paired = outputs.rails("RAILS", optional=True)
-        paired.setCreateByDefault(False)
-        self.addParameter(paired)
-        for output in outputs.centerline_figures():
-            self.addOutput(output)
+            outputs.centerlines(),
+            outputs.on_demand(outputs.rails("RAILS", optional=True)),
+            *outputs.centerline_figures(),
+        )
 
-    def read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Job:
+    def read(self, values: ParameterValues) -> Job:
         """Read and check the parameters, in the main thread."""
-        values = ParameterValues(self, parameters, context)
         standard = values.standard()
         values.lines("INPUT")
         return Job(standard, values.other_gauges(standard))
 
-    def compute(
-        self, job: Job, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
-    ) -> dict[str, Any]:
+    def compute(self, job: Job, values: ParameterValues, progress: Progress) -> dict[str, Any]:
         """Pair the rails of each class, then write the centerlines."""
         from ...core.checks.lines import with_tracks
         from ...core.fields import CENTERLINES, RAILS
@@ -85,14 +76,12 @@ class BuildTrackCenterlines(RailAlgorithm):
         from ...core.tracks.centerlines import tracks_of
         from ..reading.line_layers import read_rails
 
-        values = ParameterValues(self, parameters, context)
         rails, frame = read_rails(values.lines("INPUT"), progress.span(0, READING))
         settings = values.settings(job.standard, job.other_gauges)
         tracks = tracks_of(rails, settings, progress.span(READING, 1))
         progress.check()
-        rest = (frame, parameters, context)
-        written = write_layer(self, "OUTPUT", lines_layer(CENTERLINES, tracks), *rest)
-        if is_wanted(parameters.get("RAILS"), context):
+        written = write_layer(values, "OUTPUT", lines_layer(CENTERLINES, tracks), frame)
+        if values.wanted("RAILS"):
             paired = with_tracks(rails, tracks, progress)
-            written.update(write_layer(self, "RAILS", lines_layer(RAILS, paired), *rest))
+            written.update(write_layer(values, "RAILS", lines_layer(RAILS, paired), frame))
         return {**written, **figures_of(tracks, "CENTERLINE")}

@@ -8,7 +8,6 @@ from typing import Any
 
 from qgis.core import (
     Qgis,
-    QgsProcessingContext,
     QgsProcessingOutputBoolean,
     QgsProcessingOutputString,
 )
@@ -16,7 +15,8 @@ from qgis.core import (
 from ...core.errors import RailExtractError
 from ...core.progress import Progress
 from ..dialog import outputs
-from ..i18n import tr
+from ..dialog.definitions import Definitions
+from ..dialog.parameter_values import ParameterValues
 from ..setup.dependencies import missing_packages
 from ..writing.reports import write_check
 from .base import RailAlgorithm
@@ -38,24 +38,21 @@ class CheckInstallation(RailAlgorithm):
         "with the true rails. Include the output in every bug report."
     )
 
-    def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:
-        """Declare the outputs; without the report among them, QGIS would open no dialog and show no result."""
-        self._add_report(outputs.check_report())
-        for name, label in (
-            ("VERSIONS", tr("Versions of QGIS, Python and packages")),
-            ("MODELS", tr("State of the models")),
-            ("ENGINE_USED", tr("Engine and device that run the network")),
-            ("SELF_TEST", tr("Result of the test")),
-        ):
-            self.addOutput(QgsProcessingOutputString(name, label))
-        self.addOutput(QgsProcessingOutputBoolean("PASSED", tr("Whether all checks passed")))
+    def definitions(self) -> Definitions:
+        """Return the outputs; without the report among them, QGIS would open no dialog and show no result."""
+        return (
+            outputs.check_report(),
+            QgsProcessingOutputString("VERSIONS", "Versions of QGIS, Python and packages"),
+            QgsProcessingOutputString("MODELS", "State of the models"),
+            QgsProcessingOutputString("ENGINE_USED", "Engine and device that run the network"),
+            QgsProcessingOutputString("SELF_TEST", "Result of the test"),
+            QgsProcessingOutputBoolean("PASSED", "Whether all checks passed"),
+        )
 
-    def read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> None:
+    def read(self, values: ParameterValues) -> None:
         """Read nothing: there are no parameters."""
 
-    def compute(
-        self, job: None, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
-    ) -> dict[str, Any]:
+    def compute(self, job: None, values: ParameterValues, progress: Progress) -> dict[str, Any]:
         """Check everything, and report it line by line."""
         from ..setup import self_test
 
@@ -71,13 +68,13 @@ class CheckInstallation(RailAlgorithm):
             progress.info(f"{name}: {text}")
         passed, words, engine = self._test(progress)
         if passed and set(models.values()) != {"ok"}:
-            passed, words = False, tr("{}, but the weights are not those of the release").format(words)
-        verdict = tr("passed") if passed else tr("failed")
-        sentence = tr("Rail Extract works here.") if passed else tr("Rail Extract does not work here.")
+            passed, words = False, f"{words}, but the weights are not those of the release"
+        verdict = "passed" if passed else "failed"
+        sentence = "Rail Extract works here." if passed else "Rail Extract does not work here."
         (progress.info if passed else progress.warning)(f"{sentence} Self test {verdict}: {words}.")
-        facts = {tr("Self test"): f"{verdict}: {words}", tr("Engine"): engine or tr("none"), **found}
+        facts = {"Self test": f"{verdict}: {words}", "Engine": engine or "none", **found}
         return {
-            **write_check(self, "REPORT", sentence, facts, parameters, context),
+            **write_check(values, sentence, facts),
             "VERSIONS": _joined(versions),
             "MODELS": _joined(models),
             "ENGINE_USED": engine,
@@ -92,7 +89,7 @@ class CheckInstallation(RailAlgorithm):
         missing = missing_packages(ExtractRails.NEEDS)
         if missing:
             names = ", ".join(package.module for package in missing)
-            return False, tr("{} missing: run Install packages").format(names), ""
+            return False, f"{names} missing: run Install packages", ""
         try:
             return self_test.extract_sample(progress)
         except (RailExtractError, ImportError) as error:

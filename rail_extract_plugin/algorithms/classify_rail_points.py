@@ -6,12 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from qgis.core import QgsProcessingContext
-
 from ...core.progress import Estimating, Progress
 from ...core.standards import SEARCHED_CLASSES, Gauge, RailStandard
 from ..dialog import inputs, outputs
 from ..dialog import parameters as groups
+from ..dialog.definitions import Definitions
 from ..dialog.parameter_values import ParameterValues
 from ..reading.clouds import CloudSource, points_folder, request_points
 from .base import CLOUD_WORDS, RAIL_WORDS, RailAlgorithm
@@ -57,9 +56,9 @@ class ClassifyRailPoints(RailAlgorithm):
         "per metre of rail, lines are less accurate and may have gaps. The method was tested on simulated clouds only."
     )
 
-    def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:
-        """Declare the parameters and outputs in the order of the interface."""
-        for definition in (
+    def definitions(self) -> Definitions:
+        """Return the parameters and outputs in the order of the interface."""
+        return (
             inputs.raw_cloud(),
             *groups.rail(),
             groups.other_gauges(),
@@ -70,18 +69,15 @@ class ClassifyRailPoints(RailAlgorithm):
             *groups.labels(),
             groups.workers(),
             outputs.classified(),
-        ):
-            self.addParameter(definition)
-        for output in outputs.classified_figures():
-            self.addOutput(output)
+            *outputs.classified_figures(),
+        )
 
-    def read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Job:
+    def read(self, values: ParameterValues) -> Job:
         """Read and check the parameters, in the main thread."""
         from ...core.labelling.files import plan_output
 
-        values = ParameterValues(self, parameters, context)
         standard = values.standard()
-        output = Path(self.parameterAsFileOutput(parameters, "OUTPUT", context))
+        output = Path(values.output_file("OUTPUT"))
         cloud = values.cloud("INPUT")
         job = Job(
             cloud,
@@ -95,17 +91,15 @@ class ClassifyRailPoints(RailAlgorithm):
         plan_output(job.cloud.paths, output, job.class_code)
         return job
 
-    def compute(
-        self, job: Job, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
-    ) -> dict[str, Any]:
+    def compute(self, job: Job, values: ParameterValues, progress: Progress) -> dict[str, Any]:
         """Classify the cloud and write the copy."""
         from ...core.classify.settings import Settings
         from ...core.labelling.files import Choice, classify_files, plan_output
         from ...core.labelling.finding import guide_of
 
-        values, progress = ParameterValues(self, parameters, context), Estimating(progress)
+        progress = Estimating(progress)
         gauges_m = (job.standard.gauge_m, *(gauge_m for gauge_m, _ in job.other_gauges))
-        choice = Choice(job.class_code, self.parameterAsEnum(parameters, "CONTENT", context) == 1, values.flag("RESET"))
+        choice = Choice(job.class_code, values.rails_only(), values.flag("RESET"))
         output = plan_output(job.cloud.paths, job.output, job.class_code, progress)
         request = request_points(job.cloud, SEARCHED_CLASSES, values.extent, progress)
         guide = None

@@ -6,17 +6,17 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import TYPE_CHECKING, Any
 
-from qgis.core import QgsProcessingContext, QgsProcessingFeatureSource
+from qgis.core import QgsProcessingFeatureSource
 
 from ...core.errors import ParameterError
 from ...core.fields import DIFFERENCE_FIELDS
 from ...core.progress import Progress
 from ..dialog import inputs, outputs
 from ..dialog import parameters as groups
+from ..dialog.definitions import Definitions
 from ..dialog.parameter_values import ParameterValues
-from ..dialog.passwords import masked
 from ..writing.layers import write_layer
-from ..writing.reports import write_comparison
+from ..writing.reports import write_shown
 from ..writing.whole_files import write_each
 from .base import RAIL_WORDS, TRACK_WORDS, RailAlgorithm
 from .toolbox_groups import ALIGNMENT
@@ -76,37 +76,35 @@ class CompareTracks(RailAlgorithm):
         )
     )
 
-    def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:
-        """Declare the parameters and outputs in the order of the interface."""
-        for definition in (*inputs.surveys(), *groups.comparison(), outputs.differences()):
-            self.addParameter(definition)
-        self._add_report(outputs.comparison_report())
-        for output in outputs.comparison_figures():
-            self.addOutput(output)
+    def definitions(self) -> Definitions:
+        """Return the parameters and outputs in the order of the interface."""
+        return (
+            *inputs.surveys(),
+            *groups.comparison(),
+            outputs.differences(),
+            outputs.comparison_report(),
+            *outputs.comparison_figures(),
+        )
 
-    def read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Job:
+    def read(self, values: ParameterValues) -> Job:
         """Read and check the parameters, in the main thread."""
-        values = ParameterValues(self, parameters, context)
         rails = [name for name, _ in SURVEYS.values() if values.filled(name)]
         if len(rails) == 1:
             other = next(name for name, _ in SURVEYS.values() if name not in rails)
             raise ParameterError(f"Gauge and cant are compared between the rails of both surveys: choose {other}, too.")
         return Job(
             {name: values.lines(name) for name in (*SURVEYS, *rails)},
-            masked(self.asPythonCommand(parameters, context)),
+            values.command(),
         )
 
-    def compute(
-        self, job: Job, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
-    ) -> dict[str, Any]:
+    def compute(self, job: Job, values: ParameterValues, progress: Progress) -> dict[str, Any]:
         """Compare the lines, then write points and report."""
         from ...core.comparison.tracks import compare_surveys, doubts_of
         from ...core.output.layers import differences_layer
         from ...core.parameters import ComparisonParameters
-        from ...core.report.comparison import describe_shift, verdict_on
+        from ...core.report.comparison import build_comparison, describe_shift, verdict_on
         from ..reading.surveys import read_surveys
 
-        values = ParameterValues(self, parameters, context)
         stated = {name: values.optional_number(sigma) for name, (_, sigma) in SURVEYS.items()}
         surveys = read_surveys(job.sources, SURVEYS, stated, progress.span(0, READING))
         ignored = values.flag("IGNORE_SHIFT")
@@ -117,14 +115,13 @@ class CompareTracks(RailAlgorithm):
             progress.info(sentence)
         for sentence in doubts_of(found):
             progress.warning(sentence)
-        rest = (parameters, context)
         source = " against ".join(job.sources[name].sourceName() for name in ("INPUT", "REFERENCE"))
         facts = {"Date": f"{datetime.now():%Y-%m-%d %H:%M}", "Command": job.command}
         writers = {
-            "OUTPUT": lambda: write_layer(self, "OUTPUT", differences_layer(found), surveys.frame, *rest),
-            "REPORT": lambda: write_comparison(self, "REPORT", found, not ignored, source, facts, *rest),
+            "OUTPUT": lambda: write_layer(values, "OUTPUT", differences_layer(found), surveys.frame),
+            "REPORT": lambda: write_shown(values, lambda: build_comparison(found, not ignored, source, facts)),
         }
-        return {**write_each(writers, *rest), **_figures(found)}
+        return {**write_each(writers, values), **_figures(found)}
 
 
 def _figures(found: TrackComparison) -> dict[str, Any]:

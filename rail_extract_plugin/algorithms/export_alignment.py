@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from qgis.core import QgsCoordinateReferenceSystem, QgsProcessingContext, QgsProcessingFeatureSource
+from qgis.core import QgsCoordinateReferenceSystem, QgsProcessingFeatureSource
 
 from ...core import VERSION
 from ...core.disk import Destination
@@ -14,6 +14,7 @@ from ...core.progress import Progress
 from ...core.standards import RailStandard
 from ..dialog import inputs, outputs
 from ..dialog import parameters as groups
+from ..dialog.definitions import Definitions
 from ..dialog.parameter_values import ParameterValues
 from ..systems import prepare_system
 from .base import ALIGNMENT_WORDS, RAIL_WORDS, RailAlgorithm
@@ -55,30 +56,30 @@ class ExportAlignment(RailAlgorithm):
         "railhead width give the distance across which cant is measured."
     )
 
-    def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:
-        """Declare the parameters and outputs in the order of the interface."""
-        for definition in (*inputs.elements(), *groups.rail(), groups.vertical_curves(), outputs.alignment_file()):
-            self.addParameter(definition)
-        for output in outputs.alignment_figures():
-            self.addOutput(output)
+    def definitions(self) -> Definitions:
+        """Return the parameters and outputs in the order of the interface."""
+        return (
+            *inputs.elements(),
+            *groups.rail(),
+            groups.vertical_curves(),
+            outputs.alignment_file(),
+            *outputs.alignment_figures(),
+        )
 
-    def read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Job:
+    def read(self, values: ParameterValues) -> Job:
         """Read and check the parameters, in the main thread."""
         from ...core.output.design_files import check_format
         from ..reading.line_layers import wkt_of
 
-        values = ParameterValues(self, parameters, context)
         source = values.table("INPUT")
         crs = source.sourceCrs() if source.sourceCrs().isValid() else values.projected_crs()
         prepare_system(wkt_of(crs) or None)
-        path = Path(self.parameterAsFileOutput(parameters, "OUTPUT", context))
+        path = Path(values.output_file("OUTPUT"))
         check_format(path)
         circles = values.choice("VERTICAL_CURVES") == groups.VERTICAL_CURVES[0]
         return Job(source, crs, values.standard(), path, circles)
 
-    def compute(
-        self, job: Job, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
-    ) -> dict[str, Any]:
+    def compute(self, job: Job, values: ParameterValues, progress: Progress) -> dict[str, Any]:
         """Read the table, check it and write the file."""
         from ...core.output.design_files import check_designs, write_designs
         from ..reading.element_tables import read_elements

@@ -6,8 +6,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from qgis.core import QgsProcessingContext
-
 from ...core.errors import ParameterError
 from ...core.frpdf.models import choose as choose_model
 from ...core.parameters import LEARNED
@@ -15,12 +13,10 @@ from ...core.progress import Estimating, Progress
 from ...core.standards import DEFAULT, SEARCHED_CLASSES, Gauge, RailStandard
 from ..dialog import inputs, outputs
 from ..dialog import parameters as groups
+from ..dialog.definitions import Definitions
 from ..dialog.parameter_values import ParameterValues
-from ..dialog.passwords import masked
-from ..i18n import tr
 from ..reading.clouds import CloudSource, checked_crs, points_folder, request_points
 from ..systems import system
-from ..writing.destinations import is_wanted
 from ..writing.layers import figures_of, figures_of_stations, layer_writers, write_raster
 from ..writing.reports import write_report
 from ..writing.run import properties_of
@@ -75,9 +71,9 @@ class ExtractRails(RailAlgorithm):
     )
     PAGES = ("parameters", "tutorial", "limits", "troubleshooting")
 
-    def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:
-        """Declare the parameters and outputs in the order of the interface."""
-        for definition in (
+    def definitions(self) -> Definitions:
+        """Return the parameters and outputs in the order of the interface."""
+        return (
             *inputs.cloud(),
             inputs.merge_classes(),
             inputs.classify(),
@@ -93,30 +89,23 @@ class ExtractRails(RailAlgorithm):
             groups.step(),
             groups.workers(),
             *inputs.axis(optional=True),
-        ):
-            self.addParameter(definition)
-        self.addParameter(outputs.rails("RAILS", optional=True))
-        centerlines, quality, findings, cleaned = (
-            outputs.centerlines("CENTERLINES", optional=True),
-            outputs.quality("QUALITY"),
-            outputs.findings(),
-            outputs.cleaned(),
+            outputs.rails("RAILS", optional=True),
+            outputs.further(outputs.centerlines("CENTERLINES", optional=True)),
+            outputs.further(outputs.on_demand(outputs.quality("QUALITY"))),
+            outputs.further(outputs.findings()),
+            outputs.further(outputs.on_demand(outputs.cleaned())),
+            outputs.report(),
+            *outputs.rail_figures(),
+            *outputs.centerline_figures(),
+            *outputs.quality_figures(),
+            outputs.engine(),
         )
-        for extra in (quality, cleaned):
-            extra.setCreateByDefault(False)
-        for destination in (centerlines, quality, findings, cleaned):
-            self.addParameter(outputs.further(destination))
-        self._add_report(outputs.report())
-        figures = (*outputs.rail_figures(), *outputs.centerline_figures(), *outputs.quality_figures())
-        for output in (*figures, outputs.engine()):
-            self.addOutput(output)
 
-    def read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Job:
+    def read(self, values: ParameterValues) -> Job:
         """Read and check the parameters, in the main thread."""
         names = [output.name() for output in self.destinationParameterDefinitions()]
-        if not any(is_wanted(parameters.get(name), context) for name in names):
+        if not any(map(values.wanted, names)):
             raise ParameterError(f"No output is chosen: name at least one of {', '.join(names)}.")
-        values = ParameterValues(self, parameters, context)
         classify, grow = values.flag("CLASSIFY"), values.filled("SEEDS")
         if classify and grow:
             raise ParameterError("CLASSIFY finds all rails, and SEEDS those that are pointed at: choose one of them.")
@@ -133,18 +122,17 @@ class ExtractRails(RailAlgorithm):
             SEARCHED_CLASSES if classify or grow else values.class_codes(),
             standard,
             values.other_gauges(standard),
-            masked(self.asPythonCommand(parameters, context)),
+            values.command(),
             weights,
             values.seeds(cloud) if grow else (),
-            self._axes(cloud, parameters, context),
+            self._axes(cloud, values),
         )
 
-    def _axes(self, cloud: CloudSource, parameters: dict[str, Any], context: QgsProcessingContext) -> PlacedAxes | None:
+    def _axes(self, cloud: CloudSource, values: ParameterValues) -> PlacedAxes | None:
         """Read the axes in the coordinate system of the cloud; None without any."""
-        values = ParameterValues(self, parameters, context)
         if not values.has_axis():
             return None
-        if not any(is_wanted(parameters.get(name), context) for name in ("QUALITY", "FINDINGS", "REPORT")):
+        if not any(map(values.wanted, MEASURED)):
             raise ParameterError("AXIS gives QUALITY, FINDINGS and REPORT kilometres: name at least one of these.")
         return values.axes(system(checked_crs(cloud)))
 
@@ -152,32 +140,27 @@ class ExtractRails(RailAlgorithm):
         """Return the job with the rail standard that fits the points."""
         from ...core.checks.standard import detect_in_raw, detect_standard
 
-        progress.status(tr("Measuring gauge and railheads"))
+        progress.status("Measuring gauge and railheads")
         detect = detect_in_raw if values.flag("CLASSIFY") else detect_standard
         standard = values.standard(detect(request, progress.span(0, 0)).name)
         choose_model(standard.gauge_m, standard.head_width_m, values.choice("MODEL"))
         return replace(job, standard=standard, other_gauges=values.other_gauges(standard))
 
-    def compute(
-        self, job: Job, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
-    ) -> dict[str, Any]:
+    def compute(self, job: Job, values: ParameterValues, progress: Progress) -> dict[str, Any]:
         """Extract the rails and tracks, then write the outputs."""
         from ...core.pipeline import extract_files
         from ...core.report import Origin, summary
 
-        values, progress = ParameterValues(self, parameters, context), Estimating(progress)
+        progress = Estimating(progress)
         request = request_points(job.cloud, job.class_codes, values.extent, progress)
         classify = values.flag("CLASSIFY")
         request = replace(request, merged=values.flag("MERGE_CLASSES") and not classify and not job.seeds)
         if values.detects():
             job = self._detected(job, request, values, progress)
-        measures, keeps = (
-            any(is_wanted(parameters.get(name), context) for name in names) for names in (MEASURED, ("CLEANED",))
-        )
         settings = replace(
             values.settings(job.standard, job.other_gauges),
-            quality_step_m=values.number("STEP") if measures else None,
-            keep_cleaned=keeps,
+            quality_step_m=values.number("STEP") if any(map(values.wanted, MEASURED)) else None,
+            keep_cleaned=values.wanted("CLEANED"),
         )
         with points_folder() as folder, values.runner() as runner:
             network = extract_files(request, folder, settings, runner, progress, classify, job.weights, job.seeds)
@@ -190,45 +173,30 @@ class ExtractRails(RailAlgorithm):
         self.layer_properties = properties_of(job.cloud, job.class_codes, job.standard.head_width_m, network.frame)
         for sentence in summary(network, origin.gauges_m):
             progress.info(sentence)
-        written = self._write(job, network, origin, parameters, context)
+        written = self._write(job, network, origin, values)
         figures = {**figures_of(network.rails, "RAIL"), **figures_of(network.centerlines, "CENTERLINE")}
         measured = figures_of_stations(network.geometry) if settings.quality_step_m else {}
         return {**written, **figures, **measured, "ENGINE_USED": network.engine}
 
-    def _write(
-        self,
-        job: Job,
-        network: RailNetwork,
-        origin: Origin,
-        parameters: dict[str, Any],
-        context: QgsProcessingContext,
-    ) -> dict[str, str]:
+    def _write(self, job: Job, network: RailNetwork, origin: Origin, values: ParameterValues) -> dict[str, str]:
         """Write all outputs."""
         from ...core.output.layers import network_makers
 
-        rest = parameters, context
         makers = {name.upper(): make for name, make in network_makers(network, origin.gauges_m).items()}
         writers = {
-            "CLEANED": lambda: self._write_cleaned(job, network, *rest),
-            **layer_writers(self, makers, network.frame, *rest),
-            "REPORT": lambda: write_report(self, "REPORT", network, origin, *rest),
+            "CLEANED": lambda: self._write_cleaned(job, network, values),
+            **layer_writers(values, makers, network.frame),
+            "REPORT": lambda: write_report(values, network, origin),
         }
-        return write_each(writers, parameters, context)
+        return write_each(writers, values)
 
-    def _write_cleaned(
-        self,
-        job: Job,
-        network: RailNetwork,
-        parameters: dict[str, Any],
-        context: QgsProcessingContext,
-    ) -> dict[str, str]:
+    def _write_cleaned(self, job: Job, network: RailNetwork, values: ParameterValues) -> dict[str, str]:
         """Write the network's output as Clean Rail Raster does; no file if no rail cell is left."""
         from ...core.output.raster_file import header_for, on_one_grid
 
         if not any(raster.tiles for raster in network.cleaned):
             return {}
         rasters, frame = on_one_grid(network.cleaned, network.frame)
-        values = ParameterValues(self, parameters, context)
         extent, model = values.extent(system(network.frame.crs_wkt)), values.choice("MODEL")
         header = header_for(rasters, network.cleaned_classes, frame, job.standard, extent, model)
-        return write_raster(self, "CLEANED", header, rasters, parameters, context)
+        return write_raster(values, "CLEANED", header, rasters)

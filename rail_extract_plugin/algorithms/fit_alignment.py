@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from qgis.core import QgsProcessingContext, QgsProcessingFeatureSource
+from qgis.core import QgsProcessingFeatureSource
 
 from ...core.parameters import FitParameters
 from ...core.progress import Progress
 from ..dialog import inputs, outputs
 from ..dialog import parameters as groups
+from ..dialog.definitions import Definitions
 from ..dialog.parameter_values import ParameterValues
-from ..dialog.passwords import masked
 from ..writing.layers import figures_of_fits, layer_writers
 from ..writing.reports import write_alignment_report
 from ..writing.whole_files import write_each
@@ -59,21 +59,21 @@ class FitAlignment(RailAlgorithm):
         )
     )
 
-    def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:
-        """Declare the parameters and outputs in the order of the interface."""
-        layers = (inputs.tracks_to_fit(), *inputs.cant_of_tracks())
-        deviations = outputs.further(outputs.deviations())
-        for definition in (*layers, *groups.alignment(), inputs.fixed(), outputs.elements(), deviations):
-            self.addParameter(definition)
-        report = outputs.alignment_report()
-        report.setCreateByDefault(False)
-        self._add_report(report)
-        for output in outputs.fit_figures():
-            self.addOutput(output)
+    def definitions(self) -> Definitions:
+        """Return the parameters and outputs in the order of the interface."""
+        return (
+            inputs.tracks_to_fit(),
+            *inputs.cant_of_tracks(),
+            *groups.alignment(),
+            inputs.fixed(),
+            outputs.elements(),
+            outputs.further(outputs.deviations()),
+            outputs.on_demand(outputs.alignment_report()),
+            *outputs.fit_figures(),
+        )
 
-    def read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Job:
+    def read(self, values: ParameterValues) -> Job:
         """Read and check the parameters, in the main thread."""
-        values = ParameterValues(self, parameters, context)
         return Job(
             values.lines("INPUT"),
             values.table("QUALITY") if values.filled("QUALITY") else None,
@@ -85,12 +85,10 @@ class FitAlignment(RailAlgorithm):
                 values.choice("TRANSITIONS"),
                 values.flag("ROUND"),
             ),
-            masked(self.asPythonCommand(parameters, context)),
+            values.command(),
         )
 
-    def compute(
-        self, job: Job, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
-    ) -> dict[str, Any]:
+    def compute(self, job: Job, values: ParameterValues, progress: Progress) -> dict[str, Any]:
         """Fit each track, then write elements and deviations."""
         from ...core.alignment.fit import fit_tracks
         from ...core.fields import DEVIATIONS
@@ -100,7 +98,6 @@ class FitAlignment(RailAlgorithm):
         tracks, frame = read_tracks(job.tracks, job.quality, job.rails, progress.span(0, READING))
         fixed = read_fixed(job.fixed, frame) if job.fixed else {}
         fits = fit_tracks(tracks, frame, job.settings, fixed, progress.span(READING, FITTING))
-        rest = (parameters, context)
         alignments, deviations = [one.alignment for one in fits], [one.deviations for one in fits]
         courses = list(zip(alignments, deviations))
         name, facts = job.tracks.sourceName(), {"Command": job.command}
@@ -109,7 +106,7 @@ class FitAlignment(RailAlgorithm):
             "DEVIATIONS": lambda: stations_layer(DEVIATIONS, deviations),
         }
         writers = {
-            **layer_writers(self, makers, frame, *rest),
-            "REPORT": lambda: write_alignment_report(self, "REPORT", courses, name, facts, True, *rest),
+            **layer_writers(values, makers, frame),
+            "REPORT": lambda: write_alignment_report(values, courses, name, facts, True),
         }
-        return {**write_each(writers, *rest), **figures_of_fits(fits)}
+        return {**write_each(writers, values), **figures_of_fits(fits)}

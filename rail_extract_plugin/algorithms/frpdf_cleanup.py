@@ -6,15 +6,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from qgis.core import QgsProcessingContext, QgsProcessingParameterRasterDestination
+from qgis.core import QgsProcessingParameterRasterDestination
 
 from ...core.frpdf.models import Model
 from ...core.progress import Progress
 from ..dialog import inputs, outputs
 from ..dialog import parameters as groups
-from ..dialog.definitions import helped
+from ..dialog.definitions import Definitions, helped
 from ..dialog.parameter_values import ParameterValues
-from ..i18n import tr
 from ..writing.layers import write_raster
 from .base import RAIL_WORDS, RailAlgorithm
 from .toolbox_groups import STEPS
@@ -51,39 +50,37 @@ class FrpdfCleanup(RailAlgorithm):
         "A raster from other software does not state its gauge and railhead width: fill them in."
     )
 
-    def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:
-        """Declare the parameters and outputs in the order of the interface."""
-        for definition in (inputs.raster(), groups.model(), *groups.cleanup(), *groups.raster_rail()):
-            self.addParameter(definition)
-        self.addParameter(
+    def definitions(self) -> Definitions:
+        """Return the parameters and outputs in the order of the interface."""
+        return (
+            inputs.raster(),
+            groups.model(),
+            *groups.cleanup(),
+            *groups.raster_rail(),
             helped(
-                QgsProcessingParameterRasterDestination("OUTPUT", tr("Cleaned rail raster")),
-                tr("A GeoTIFF; the input of Vectorize Rails."),
-            )
+                QgsProcessingParameterRasterDestination("OUTPUT", "Cleaned rail raster"),
+                "A GeoTIFF; the input of Vectorize Rails.",
+            ),
+            outputs.engine(),
         )
-        self.addOutput(outputs.engine())
 
-    def read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Job:
+    def read(self, values: ParameterValues) -> Job:
         """Read the header of the raster and check that a model fits it."""
         from ..reading.rasters import choose_model
 
-        values = ParameterValues(self, parameters, context)
         path, header = values.raster("INPUT")
         standard = header.standard(values.optional_number("GAUGE"), values.optional_number("HEAD_WIDTH"))
         header = replace(header, gauge_m=standard.gauge_m, head_width_m=standard.head_width_m)
         model = choose_model(header, standard, values.choice("MODEL"))
         return Job(path, replace(header, model=model.name), model)
 
-    def compute(
-        self, job: Job, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
-    ) -> dict[str, Any]:
+    def compute(self, job: Job, values: ParameterValues, progress: Progress) -> dict[str, Any]:
         """Clean each band, then write the file."""
         from ...core.frpdf.cleanup import clean
         from ...core.frpdf.engine import make_engine
         from ...core.frpdf.weights import load_arrays
         from ..reading.geotiff import read_rasters
 
-        values = ParameterValues(self, parameters, context)
         engine = make_engine(load_arrays(job.model.path), values.choice("ENGINE"), values.choice("DEVICE"))
         rasters = read_rasters(job.path, job.header, progress.span(0, READING))
         passes = int(values.number("ITERATIONS"))
@@ -92,5 +89,5 @@ class FrpdfCleanup(RailAlgorithm):
         cleaned = [clean(raster, engine, passes, share) for raster, share in zip(rasters, shares)]
         for code, before, after in zip(job.header.class_codes, rasters, cleaned):
             progress.info(f"Class {code}: {before.count():,} rail cells before, {after.count():,} after.")
-        written = write_raster(self, "OUTPUT", job.header, cleaned, parameters, context, progress.span(WRITING, 1))
+        written = write_raster(values, "OUTPUT", job.header, cleaned, progress.span(WRITING, 1))
         return {**written, "ENGINE_USED": engine.description}

@@ -6,13 +6,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from qgis.core import QgsProcessingContext
-
 from ...core.parameters import GrowParameters
 from ...core.progress import Estimating, Progress
 from ...core.standards import SEARCHED_CLASSES, RailStandard
 from ..dialog import inputs, outputs
 from ..dialog import parameters as groups
+from ..dialog.definitions import Definitions
 from ..dialog.parameter_values import ParameterValues
 from ..reading.clouds import CloudSource, points_folder, request_points
 from ..writing.layers import write_layer
@@ -56,9 +55,9 @@ class GrowRailPoints(RailAlgorithm):
         "tested on simulated clouds only."
     )
 
-    def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:
-        """Declare the parameters and outputs in the order of the interface."""
-        for definition in (
+    def definitions(self) -> Definitions:
+        """Return the parameters and outputs in the order of the interface."""
+        return (
             inputs.raw_cloud(),
             *inputs.seeds(),
             *groups.rail(),
@@ -68,26 +67,21 @@ class GrowRailPoints(RailAlgorithm):
             *groups.content(),
             outputs.classified(),
             outputs.further(outputs.stops()),
-        ):
-            self.addParameter(definition)
-        for output in outputs.classified_figures():
-            self.addOutput(output)
+            *outputs.classified_figures(),
+        )
 
-    def read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Job:
+    def read(self, values: ParameterValues) -> Job:
         """Read and check the parameters, in the main thread."""
         from ...core.labelling.files import plan_output
 
-        values = ParameterValues(self, parameters, context)
         standard = values.standard()
-        output = Path(self.parameterAsFileOutput(parameters, "OUTPUT", context))
+        output = Path(values.output_file("OUTPUT"))
         cloud = values.cloud("INPUT")
         job = Job(cloud, standard, values.growth(), int(values.number("RAIL_CLASS")), output, values.seeds(cloud))
         plan_output(job.cloud.paths, output, job.class_code)
         return job
 
-    def compute(
-        self, job: Job, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
-    ) -> dict[str, Any]:
+    def compute(self, job: Job, values: ParameterValues, progress: Progress) -> dict[str, Any]:
         """Follow the rails and write the copy."""
         from ...core.grow.settings import GrowSettings
         from ...core.labelling.files import Choice, plan_output
@@ -96,11 +90,11 @@ class GrowRailPoints(RailAlgorithm):
         from ...core.tasks import InTurn
 
         progress = Estimating(progress)
-        choice = Choice(job.class_code, self.parameterAsEnum(parameters, "CONTENT", context) == 1, reset=False)
+        choice = Choice(job.class_code, values.rails_only(), reset=False)
         output = plan_output(job.cloud.paths, job.output, job.class_code, progress)
         request = request_points(job.cloud, SEARCHED_CLASSES, lambda crs: None, progress)
         settings = GrowSettings(job.standard.gauge_m, job.standard.head_width_m, job.parameters)
         with points_folder() as folder:
             grown = grow_files(request, job.seeds, settings, choice, output, folder, InTurn(), progress)
         results = classified_results(grown.file, grown.point_count, grown.figures)
-        return {**results, **write_layer(self, "STOPS", stops_layer(grown.stops), request.zero, parameters, context)}
+        return {**results, **write_layer(values, "STOPS", stops_layer(grown.stops), request.zero)}

@@ -7,15 +7,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from qgis.core import QgsProcessingContext, QgsProcessingFeatureSource
+from qgis.core import QgsProcessingFeatureSource
 
 from ...core.errors import CrsError, ParameterError
 from ...core.progress import Progress
 from ..dialog import inputs, outputs
+from ..dialog.definitions import Definitions
 from ..dialog.parameter_values import ParameterValues
-from ..dialog.passwords import masked
 from ..systems import prepare_system
-from ..writing.destinations import is_wanted
 from ..writing.layers import layer_writers
 from ..writing.reports import write_alignment_report
 from ..writing.whole_files import write_each
@@ -64,32 +63,32 @@ class ImportAlignment(RailAlgorithm):
         "with track geometry or rails the cant, and a report with a diagram of each track."
     )
 
-    def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:
-        """Declare the parameters and outputs in the order of the interface."""
-        deviations, report = outputs.deviations(), outputs.alignment_report()
-        for needs_tracks in (deviations, report):
-            needs_tracks.setCreateByDefault(False)
-        tracks = (inputs.tracks_beside_design(), *inputs.cant_beside_design())
-        for definition in (*inputs.landxml(), *tracks, outputs.elements(), outputs.axes(), outputs.further(deviations)):
-            self.addParameter(definition)
-        self._add_report(report)
-        for output in outputs.alignment_figures():
-            self.addOutput(output)
+    def definitions(self) -> Definitions:
+        """Return the parameters and outputs in the order of the interface."""
+        return (
+            *inputs.landxml(),
+            inputs.tracks_beside_design(),
+            *inputs.cant_beside_design(),
+            outputs.elements(),
+            outputs.axes(),
+            outputs.further(outputs.on_demand(outputs.deviations())),
+            outputs.on_demand(outputs.alignment_report()),
+            *outputs.alignment_figures(),
+        )
 
-    def read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Job:
+    def read(self, values: ParameterValues) -> Job:
         """Read and check the parameters and the coordinate system of the file, in the main thread."""
         from ...core.alignment.landxml_reading import stated_system
         from ...core.clouds.crs import parse_crs, units
         from ..reading.line_layers import wkt_of
 
-        values = ParameterValues(self, parameters, context)
-        path, crs = Path(self.parameterAsFile(parameters, "INPUT", context)), values.projected_crs()
+        path, crs = Path(values.text("INPUT")), values.projected_crs()
         tracks = values.lines("TRACKS") if values.filled("TRACKS") else None
         quality = values.table("QUALITY") if values.filled("QUALITY") else None
         rails = values.lines("RAILS") if values.filled("RAILS") else None
         if tracks is None and (quality or rails):
             raise ParameterError("QUALITY and RAILS state the cant of measured tracks: choose TRACKS.")
-        if tracks is None and any(is_wanted(parameters.get(name), context) for name in ("DEVIATIONS", "REPORT")):
+        if tracks is None and (values.wanted("DEVIATIONS") or values.wanted("REPORT")):
             raise ParameterError("DEVIATIONS and REPORT compare measured tracks with the alignments: choose TRACKS.")
         stated = stated_system(path)
         crs = tracks.sourceCrs() if tracks is not None and not crs.isValid() else crs
@@ -100,12 +99,10 @@ class ImportAlignment(RailAlgorithm):
                 "CRS, or correct the file."
             )
         prepare_system(wkt)
-        command = masked(self.asPythonCommand(parameters, context))
+        command = values.command()
         return Job(path, wkt, values.flag("EAST_FIRST"), tracks, quality, rails, command)
 
-    def compute(
-        self, job: Job, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
-    ) -> dict[str, Any]:
+    def compute(self, job: Job, values: ParameterValues, progress: Progress) -> dict[str, Any]:
         """Read the file and write the layers."""
         from ...core.alignment.landxml_reading import read_landxml
         from ...core.fields import DEVIATIONS
@@ -117,7 +114,7 @@ class ImportAlignment(RailAlgorithm):
         alignments = tuple(replace(one, frame=frame) for one in read)
         check_place(job.path.name, frame, job.east_first, progress)
         courses = _compared(job, alignments, frame, progress.span(READING, 1))
-        deviations, rest = [one for _, one in courses], (parameters, context)
+        deviations = [one for _, one in courses]
         facts = {"LandXML file": job.path.name, "Command": job.command}
         makers = {
             "ELEMENTS": lambda: elements_layer(alignments),
@@ -125,11 +122,11 @@ class ImportAlignment(RailAlgorithm):
             "DEVIATIONS": lambda: stations_layer(DEVIATIONS, deviations),
         }
         writers = {
-            **layer_writers(self, makers, frame, *rest),
-            "REPORT": lambda: write_alignment_report(self, "REPORT", courses, _name(job), facts, False, *rest),
+            **layer_writers(values, makers, frame),
+            "REPORT": lambda: write_alignment_report(values, courses, _name(job), facts, False),
         }
         count = sum(len(alignment.elements) for alignment in alignments)
-        written = write_each(writers, parameters, context)
+        written = write_each(writers, values)
         return {**written, "ALIGNMENT_COUNT": len(alignments), "ELEMENT_COUNT": count}
 
 

@@ -6,16 +6,16 @@ import sys
 from dataclasses import dataclass
 from typing import Any
 
-from qgis.core import QgsProcessingContext, QgsProcessingOutputFolder, QgsProcessingOutputString
+from qgis.core import QgsProcessingOutputFolder, QgsProcessingOutputString
 
 from ...core.errors import Cancelled, ParameterError, RailExtractError
 from ...core.progress import Progress
 from ..dialog import parameters as groups
+from ..dialog.definitions import Definitions
 from ..dialog.parameter_values import ParameterValues
-from ..i18n import tr
 from ..notices import notices
 from ..setup import package_folders
-from ..setup.dependencies import OPTIONAL, PACKAGES, is_installed
+from ..setup.dependencies import INSTALL, OPTIONAL, PACKAGES, is_installed
 from .base import RailAlgorithm
 from .toolbox_groups import SETUP
 
@@ -37,7 +37,7 @@ class Job:
 class InstallPackages(RailAlgorithm):
     """The algorithm ``railextract:installpackages``."""
 
-    NAME = "installpackages"
+    NAME = INSTALL
     LABEL = "Install packages"
     GROUP = SETUP
     GUIDE = "troubleshooting"
@@ -51,24 +51,24 @@ class InstallPackages(RailAlgorithm):
         "about 200 MB for the processor and several GB for an Nvidia GPU."
     )
 
-    def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:
-        """Declare the parameters and outputs."""
-        self.addParameter(groups.torch())
-        self.addOutput(QgsProcessingOutputFolder("FOLDER", tr("Folder of the packages")))
-        self.addOutput(QgsProcessingOutputString("INSTALLED", tr("Installed packages")))
+    def definitions(self) -> Definitions:
+        """Return the build of PyTorch to install, and what is said about the packages."""
+        return (
+            groups.torch(),
+            QgsProcessingOutputFolder("FOLDER", "Folder of the packages"),
+            QgsProcessingOutputString("INSTALLED", "Installed packages"),
+        )
 
-    def read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Job:
+    def read(self, values: ParameterValues) -> Job:
         """Find what is missing."""
-        build = ParameterValues(self, parameters, context).choice("TORCH")
+        build = values.choice("TORCH")
         if build == "CUDA" and sys.platform == "darwin":
             raise ParameterError("There is no CUDA on macOS: set TORCH to CPU.")
         needed = [package for package in PACKAGES if package.module not in OPTIONAL]
         missing = {package.module: package.requirement for package in needed if not is_installed(package.module)}
         return Job(missing, None if build == "NONE" or is_installed("torch") else build)
 
-    def compute(
-        self, job: Job, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
-    ) -> dict[str, Any]:
+    def compute(self, job: Job, values: ParameterValues, progress: Progress) -> dict[str, Any]:
         """Install what is missing; PyTorch last, because it may fail on its own."""
         from ..setup.installation import Order, install
         from ..setup.interpreter import find_interpreter
@@ -81,7 +81,7 @@ class InstallPackages(RailAlgorithm):
         folder = package_folders.own_folder()
         if not orders:
             notices.packages_installed.emit()
-            progress.info(tr("All packages are installed; there is nothing to do."))
+            progress.info("All packages are installed; there is nothing to do.")
             return {"FOLDER": str(folder), "INSTALLED": ""}
         interpreter = find_interpreter()
         progress.info(f"Python: {interpreter.program}")
@@ -92,9 +92,9 @@ class InstallPackages(RailAlgorithm):
             except (RailExtractError, Cancelled) as error:
                 if not installed:
                     raise
-                reason = str(error) or tr("Cancelled.")
-                raise RailExtractError(tr("{} Already installed: {}.").format(reason, ", ".join(installed))) from error
+                reason = str(error) or "Cancelled."
+                raise RailExtractError("{} Already installed: {}.".format(reason, ", ".join(installed))) from error
             package_folders.use()
-        progress.info(tr("Installed: {} in {}").format(", ".join(installed), folder))
+        progress.info("Installed: {} in {}".format(", ".join(installed), folder))
         notices.packages_installed.emit()
         return {"FOLDER": str(folder), "INSTALLED": ", ".join(installed)}

@@ -7,16 +7,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from qgis.core import QgsProcessingContext
-
 from ...core.fields import QUALITY_FIELDS
 from ...core.parameters import Parameters
 from ...core.progress import Progress, Recording
 from ...core.standards import CUSTOM, Gauge, RailStandard, resolve
 from ..dialog import inputs, outputs
 from ..dialog import parameters as groups
+from ..dialog.definitions import Definitions
 from ..dialog.parameter_values import ParameterValues
-from ..dialog.passwords import masked
 from ..reading.clouds import CloudSource, points_folder
 from ..writing.layers import figures_of_stations, layer_writers
 from ..writing.reports import write_report
@@ -74,22 +72,26 @@ class MeasureTrackGeometry(RailAlgorithm):
         )
     )
 
-    def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:
-        """Declare the parameters and outputs in the order of the interface."""
-        layers = (inputs.centerlines(), inputs.rails_of_tracks(), inputs.points_of_rails())
-        settings = (groups.step(), *groups.head(), groups.other_gauges(), groups.leave_out(), groups.workers())
-        axis = inputs.axis(optional=True)
-        findings = outputs.findings()
-        findings.setCreateByDefault(False)
-        for definition in (*layers, *settings, *axis, outputs.quality(), outputs.further(findings)):
-            self.addParameter(definition)
-        self._add_report(outputs.report())
-        for output in outputs.quality_figures():
-            self.addOutput(output)
+    def definitions(self) -> Definitions:
+        """Return the parameters and outputs in the order of the interface."""
+        return (
+            inputs.centerlines(),
+            inputs.rails_of_tracks(),
+            inputs.points_of_rails(),
+            groups.step(),
+            *groups.head(),
+            groups.other_gauges(),
+            groups.leave_out(),
+            groups.workers(),
+            *inputs.axis(optional=True),
+            outputs.quality(),
+            outputs.further(outputs.on_demand(outputs.findings())),
+            outputs.report(),
+            *outputs.quality_figures(),
+        )
 
-    def read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Job:
+    def read(self, values: ParameterValues) -> Job:
         """Read and check the parameters, in the main thread."""
-        values = ParameterValues(self, parameters, context)
         for name in ("INPUT", "RAILS"):
             values.lines(name)
         head_width_m = values.head_width_m()
@@ -101,13 +103,11 @@ class MeasureTrackGeometry(RailAlgorithm):
             standard,
             values.other_gauges(standard) if standard else (),
             values.cloud("POINTS") if values.filled("POINTS") else None,
-            masked(self.asPythonCommand(parameters, context)),
+            values.command(),
             values.axes(values.lines("INPUT").sourceCrs()) if values.has_axis() else None,
         )
 
-    def compute(
-        self, job: Job, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
-    ) -> dict[str, Any]:
+    def compute(self, job: Job, values: ParameterValues, progress: Progress) -> dict[str, Any]:
         """Measure each track, then write the points."""
         from ...core.output.layers import network_makers
         from ...core.rails import RailNetwork
@@ -117,7 +117,7 @@ class MeasureTrackGeometry(RailAlgorithm):
         from ...core.tracks.parallels import widths_by_gauge
         from ..reading.track_inputs import check_gauges, read_inputs, with_measured_gauge
 
-        values, progress = ParameterValues(self, parameters, context), Recording(progress)
+        progress = Recording(progress)
         lines = values.lines("INPUT"), values.lines("RAILS")
         with points_folder() as folder, values.runner() as runner:
             tracks = read_inputs(*lines, job.cloud, folder, progress.span(0, READING))
@@ -129,7 +129,7 @@ class MeasureTrackGeometry(RailAlgorithm):
         measured = measure_track_geometry(tracks.centerlines, rails, job.head_width_m, step_m, share, job.gauges)
         check_gauges(tracks, measured, progress)
         progress.check()
-        frame, rest = tracks.frame, (parameters, context)
+        frame = tracks.frame
         if job.axes:
             measured = job.axes.along(measured, frame, progress)
         if job.cloud:
@@ -143,10 +143,10 @@ class MeasureTrackGeometry(RailAlgorithm):
             progress.info(sentence)
         made = network_makers(network, origin.gauges_m)
         writers = {
-            **layer_writers(self, {"OUTPUT": made["quality"], "FINDINGS": made["findings"]}, frame, *rest),
-            "REPORT": lambda: write_report(self, "REPORT", network, origin, *rest),
+            **layer_writers(values, {"OUTPUT": made["quality"], "FINDINGS": made["findings"]}, frame),
+            "REPORT": lambda: write_report(values, network, origin),
         }
-        return {**write_each(writers, *rest), **figures_of_stations(measured)}
+        return {**write_each(writers, values), **figures_of_stations(measured)}
 
 
 def _own_standard(measured: Sequence[TrackGeometry], job: Job) -> RailStandard:

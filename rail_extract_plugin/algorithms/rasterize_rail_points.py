@@ -5,16 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from qgis.core import QgsProcessingContext, QgsProcessingParameterRasterDestination
+from qgis.core import QgsProcessingParameterRasterDestination
 
 from ...core.frpdf.models import choose as choose_model
 from ...core.progress import Progress
 from ...core.standards import RailStandard
 from ..dialog import inputs
 from ..dialog import parameters as groups
-from ..dialog.definitions import helped
+from ..dialog.definitions import Definitions, helped
 from ..dialog.parameter_values import ParameterValues
-from ..i18n import tr
 from ..reading.clouds import CloudSource, read_points
 from ..systems import system
 from ..writing.layers import write_raster
@@ -50,27 +49,25 @@ class RasterizeRailPoints(RailAlgorithm):
         "Empty areas take no space in the file, so a raster may cover a whole railway line."
     )
 
-    def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:
-        """Declare the parameters and outputs in the order of the interface."""
-        for definition in (*inputs.cloud(), *groups.rail(), *groups.area()):
-            self.addParameter(definition)
-        self.addParameter(
+    def definitions(self) -> Definitions:
+        """Return the parameters and outputs in the order of the interface."""
+        return (
+            *inputs.cloud(),
+            *groups.rail(),
+            *groups.area(),
             helped(
-                QgsProcessingParameterRasterDestination("OUTPUT", tr("Rail raster")),
-                tr("A GeoTIFF; the input of Clean Rail Raster, which repairs it, or of Vectorize Rails."),
-            )
+                QgsProcessingParameterRasterDestination("OUTPUT", "Rail raster"),
+                "A GeoTIFF; the input of Clean Rail Raster, which repairs it, or of Vectorize Rails.",
+            ),
         )
 
-    def read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Job:
+    def read(self, values: ParameterValues) -> Job:
         """Read and check the parameters, in the main thread."""
-        values = ParameterValues(self, parameters, context)
         standard = values.standard()
         choose_model(standard.gauge_m, standard.head_width_m)
         return Job(values.cloud("INPUT"), values.class_codes(), standard)
 
-    def compute(
-        self, job: Job, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
-    ) -> dict[str, Any]:
+    def compute(self, job: Job, values: ParameterValues, progress: Progress) -> dict[str, Any]:
         """Rasterize each class, then write the file."""
         from ...core.output.raster_file import header_for
         from ...core.raster import cell_size, rasterize
@@ -78,7 +75,6 @@ class RasterizeRailPoints(RailAlgorithm):
         from ...core.squares.grid import MemorySource
         from ..reading.track_inputs import SQUARE_M
 
-        values = ParameterValues(self, parameters, context)
         clouds = read_points(job.cloud, job.class_codes, values.extent, progress.span(0, READING))
         dense = {source.class_code for source in plausible([MemorySource(one, SQUARE_M) for one in clouds], progress)}
         clouds = tuple(points for points in clouds if points.class_code in dense)
@@ -87,4 +83,4 @@ class RasterizeRailPoints(RailAlgorithm):
         frame, codes = clouds[0].frame, [points.class_code for points in clouds]
         extent = values.extent(system(frame.crs_wkt))
         header = header_for(rasters, codes, frame, job.standard, extent)
-        return write_raster(self, "OUTPUT", header, rasters, parameters, context, progress.span(READING, 1))
+        return write_raster(values, "OUTPUT", header, rasters, progress.span(READING, 1))

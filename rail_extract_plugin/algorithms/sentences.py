@@ -16,7 +16,6 @@ from ...core.errors import Cancelled, RailExtractError
 from ..dialog.guide import tracker
 from ..dialog.passwords import masked
 from ..dialog.wording import for_user
-from ..i18n import tr
 
 LOG = "Rail Extract"
 """Tab of QGIS's log panel."""
@@ -40,15 +39,13 @@ def sentence_for(error: BaseException, definitions: Sequence[QgsProcessingParame
     if isinstance(error, QgsProcessingException):
         return masked(str(error))
     if isinstance(error, (Cancelled, KeyboardInterrupt)):
-        return str(error) or tr("Cancelled; nothing was written.")
+        return str(error) or "Cancelled; nothing was written."
     if isinstance(error, MemoryError):
-        return tr("Not enough memory: choose a smaller extent.")
+        return "Not enough memory: choose a smaller extent."
     _log(error)
     text = masked(": ".join(filter(None, (type(error).__name__, " ".join(str(error).split())))))
-    where = tr(" at {}").format(tracker()) if tracker() else ""
-    return tr("Rail Extract failed unexpectedly ({}): report this{} with the traceback from the log.").format(
-        text, where
-    )
+    where = f" at {tracker()}" if tracker() else ""
+    return f"Rail Extract failed unexpectedly ({text}): report this{where} with the traceback from the log."
 
 
 def _log(error: BaseException) -> None:

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 from qgis.core import (
     QgsCoordinateReferenceSystem,
-    QgsProcessingContext,
     QgsProcessingFeatureSource,
     QgsProcessingUtils,
     QgsWkbTypes,
@@ -17,6 +16,7 @@ from ...core.errors import RailExtractError
 from ...core.fields import EXTENT_FIELDS, STATION_FIELDS
 from ...core.progress import Progress
 from ..dialog import inputs, outputs
+from ..dialog.definitions import Definitions
 from ..dialog.parameter_values import ParameterValues
 from ..systems import prepare_system
 from ..writing.layers import copies, fields, write_copy
@@ -62,19 +62,20 @@ class StationAlongAxis(RailAlgorithm):
         )
     )
 
-    def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:
-        """Declare the parameters and outputs in the order of the interface."""
-        for definition in (inputs.places(), *inputs.axis(optional=False), outputs.stationed()):
-            self.addParameter(definition)
-        for output in outputs.station_figures():
-            self.addOutput(output)
+    def definitions(self) -> Definitions:
+        """Return the parameters and outputs in the order of the interface."""
+        return (
+            inputs.places(),
+            *inputs.axis(optional=False),
+            outputs.stationed(),
+            *outputs.station_figures(),
+        )
 
-    def read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Job:
+    def read(self, values: ParameterValues) -> Job:
         """Read and check the parameters, in the main thread."""
         from ..reading.axes import plane_of
         from ..reading.line_layers import wkt_of
 
-        values = ParameterValues(self, parameters, context)
         source = values.table("INPUT")
         if QgsWkbTypes.geometryType(source.wkbType()) == QgsWkbTypes.GeometryType.NullGeometry:
             raise RailExtractError("INPUT is a table without places: give a layer of points, lines or polygons.")
@@ -82,16 +83,14 @@ class StationAlongAxis(RailAlgorithm):
         plane = plane_of(values.axis_crs(), source.sourceCrs())
         return Job(source, plane, values.axes(plane))
 
-    def compute(
-        self, job: Job, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
-    ) -> dict[str, Any]:
+    def compute(self, job: Job, values: ParameterValues, progress: Progress) -> dict[str, Any]:
         """Locate the features, then write them with their kilometres."""
         from ..reading.places import locate_features, station_fields
 
-        located = locate_features(job.source, job.axes, job.plane, context, progress.span(0, LOCATING))
+        located = locate_features(job.source, job.axes, job.plane, values.context, progress.span(0, LOCATING))
         added = fields(station_fields(job.source))
         columns = QgsProcessingUtils.combineFields(job.source.fields(), added)
         made = copies(located.features, columns, located.rows())
         shape, crs = job.source.wkbType(), job.source.sourceCrs()
-        written = write_copy(self, "OUTPUT", columns, shape, made, crs, parameters, context)
+        written = write_copy(values, "OUTPUT", columns, shape, made, crs)
         return {**written, **located.figures()}

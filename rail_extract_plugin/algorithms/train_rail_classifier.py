@@ -6,13 +6,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from qgis.core import QgsProcessingContext
-
 from ...core.disk import Destination
 from ...core.progress import Estimating, Progress
 from ...core.standards import SEARCHED_CLASSES, RailStandard
 from ..dialog import inputs, outputs
 from ..dialog import parameters as groups
+from ..dialog.definitions import Definitions
 from ..dialog.parameter_values import ParameterValues
 from ..reading.clouds import CloudSource, request_points
 from ..writing.reports import write_page
@@ -54,44 +53,44 @@ class TrainRailClassifier(RailAlgorithm):
         "it."
     )
 
-    def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:
-        """Declare the parameters and outputs in the order of the interface."""
-        for definition in (*inputs.cloud(), *groups.rail(), *groups.area(), *groups.training(), outputs.weights()):
-            self.addParameter(definition)
-        self._add_report(outputs.card())
-        for output in outputs.training_figures():
-            self.addOutput(output)
+    def definitions(self) -> Definitions:
+        """Return the parameters and outputs in the order of the interface."""
+        return (
+            *inputs.cloud(),
+            *groups.rail(),
+            *groups.area(),
+            *groups.training(),
+            outputs.weights(),
+            outputs.card(),
+            *outputs.training_figures(),
+        )
 
-    def read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Job:
+    def read(self, values: ParameterValues) -> Job:
         """Read and check the parameters, in the main thread."""
         from ...core.labelling.training import Plan, check_training
 
-        values = ParameterValues(self, parameters, context)
         epochs, seed = int(values.number("EPOCHS")), int(values.number("SEED"))
-        start = self.parameterAsFile(parameters, "START", context)
-        plan = Plan(values.class_codes(), epochs, seed, values.choice("DEVICE"), Path(start) if start else None)
-        check_training(Path(self.parameterAsFileOutput(parameters, "WEIGHTS", context)), plan)
+        plan = Plan(values.class_codes(), epochs, seed, values.choice("DEVICE"), values.file("START"))
+        check_training(Path(values.output_file("WEIGHTS")), plan)
         return Job(values.cloud("INPUT"), values.standard(), plan)
 
-    def compute(
-        self, job: Job, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
-    ) -> dict[str, Any]:
+    def compute(self, job: Job, values: ParameterValues, progress: Progress) -> dict[str, Any]:
         """Train, and write the weights and the card."""
         from ...core.classify.settings import Settings
         from ...core.labelling.training import train_classifier
         from ...core.report.training_card import build_card, facts_of
 
-        values, progress = ParameterValues(self, parameters, context), Estimating(progress)
+        progress = Estimating(progress)
         request = request_points(job.cloud, SEARCHED_CLASSES, values.extent, progress)
         settings = Settings((job.standard.gauge_m,), job.standard.head_width_m)
         # QGIS chooses the names of temporary files during the run.
-        weights, card = (self.parameterAsFileOutput(parameters, name, context) for name in ("WEIGHTS", "CARD"))
+        weights, card = map(values.output_file, ("WEIGHTS", "CARD"))
         destination = self.destinations.get("WEIGHTS") or Destination.at(Path(weights))
         trained = train_classifier(request, settings, job.plan, destination, progress)
         results = {"WEIGHTS": weights}
         if card:
             names = [header.path.name for header in request.headers]
             page = build_card(trained, names, facts_of(trained, job.plan, job.standard))
-            results.update(write_page(self, "CARD", card, page))
+            results.update(write_page(values, "CARD", card, page))
         total = trained.total
         return {**results, "RECALL": total.recall, "PRECISION": total.precision, "STEPS": trained.steps}

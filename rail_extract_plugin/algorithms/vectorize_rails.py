@@ -6,12 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from qgis.core import QgsProcessingContext
-
 from ...core.progress import Progress
 from ...core.standards import RailStandard
 from ..dialog import inputs, outputs
 from ..dialog import parameters as groups
+from ..dialog.definitions import Definitions
 from ..dialog.parameter_values import ParameterValues
 from ..reading.clouds import CloudSource
 from ..writing.layers import figures_of, write_layer
@@ -55,30 +54,25 @@ class VectorizeRails(RailAlgorithm):
         "A raster from other software does not state its gauge and railhead width: fill them in."
     )
 
-    def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:
-        """Declare the parameters and outputs in the order of the interface."""
-        for definition in (
+    def definitions(self) -> Definitions:
+        """Return the parameters and outputs in the order of the interface."""
+        return (
             inputs.raster(),
             inputs.points(),
             *groups.lines(),
             *groups.raster_rail(),
             groups.leave_out(),
-        ):
-            self.addParameter(definition)
-        self.addParameter(outputs.rails())
-        for output in outputs.rail_figures():
-            self.addOutput(output)
+            outputs.rails(),
+            *outputs.rail_figures(),
+        )
 
-    def read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Job:
+    def read(self, values: ParameterValues) -> Job:
         """Read the header of the raster, and find the files of the cloud."""
-        values = ParameterValues(self, parameters, context)
         path, header = values.raster("INPUT")
         standard = header.standard(values.optional_number("GAUGE"), values.optional_number("HEAD_WIDTH"))
         return Job(path, header, standard, values.cloud("POINTS") if values.filled("POINTS") else None)
 
-    def compute(
-        self, job: Job, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
-    ) -> dict[str, Any]:
+    def compute(self, job: Job, values: ParameterValues, progress: Progress) -> dict[str, Any]:
         """Vectorize each class, then write the lines."""
         from ...core.checks.lines import warn_of_rails
         from ...core.fields import RAILS
@@ -97,7 +91,7 @@ class VectorizeRails(RailAlgorithm):
             clouds = read_points_in(area, job.cloud, progress.span(READING / 2, READING))
             frame = clouds[job.header.class_codes[0]].frame
             rasters = tuple(moved(raster, job.header.frame, frame) for raster in rasters)
-        settings = ParameterValues(self, parameters, context).settings(job.standard)
+        settings = values.settings(job.standard)
         rails: list[RailLine] = []
         shares = progress.span(READING, 1).split(len(rasters))
         for raster, code, share in zip(rasters, job.header.class_codes, shares):
@@ -105,5 +99,5 @@ class VectorizeRails(RailAlgorithm):
             warn_of_rails(found, code, settings, progress)
             rails += found
         progress.check()
-        written = write_layer(self, "OUTPUT", lines_layer(RAILS, rails), frame, parameters, context)
+        written = write_layer(values, "OUTPUT", lines_layer(RAILS, rails), frame)
         return {**written, **figures_of(rails, "RAIL")}

@@ -9,27 +9,26 @@ from qgis.core import QgsProcessingParameterEnum
 
 from ...core.parameters import ALIGNED, AS_THEY_ARE, CLOTHOIDS, GEOMETRY, JUMPS, LEARNED, OVERLAP, SYNTHETIC
 from ...core.standards import CUSTOM, DETECT
-from ..i18n import tr
 
 WORDS = {
     "STANDARD": {
-        DETECT: tr("Detect from the points"),
-        CUSTOM: tr("Custom: gauge and railhead width of the advanced parameters"),
+        DETECT: "Detect from the points",
+        CUSTOM: "Custom: gauge and railhead width of the advanced parameters",
     },
-    "METHOD": {GEOMETRY: tr("The shape of rails"), LEARNED: tr("A trained classifier")},
-    "STRIPS": {AS_THEY_ARE: tr("Use them as they are"), ALIGNED: tr("Align them")},
-    "LEAVE_OUT": {OVERLAP: tr("Overlap of strips"), SYNTHETIC: tr("Synthetic points")},
-    "MODEL": {"AUTO": tr("Automatic"), "base": tr("Network of the paper"), "fast": tr("Smaller, faster network")},
-    "ENGINE": {"AUTO": tr("The faster one"), "TORCH": tr("PyTorch"), "OPENCV": tr("OpenCV")},
-    "DEVICE": {"AUTO": tr("GPU if there is one"), "CPU": tr("Processor"), "CUDA": tr("Nvidia GPU")},
-    "DIRECTION": {"INCREASING": tr("Increase"), "DECREASING": tr("Decrease")},
+    "METHOD": {GEOMETRY: "The shape of rails", LEARNED: "A trained classifier"},
+    "STRIPS": {AS_THEY_ARE: "Use them as they are", ALIGNED: "Align them"},
+    "LEAVE_OUT": {OVERLAP: "Overlap of strips", SYNTHETIC: "Synthetic points"},
+    "MODEL": {"AUTO": "Automatic", "base": "Network of the paper", "fast": "Smaller, faster network"},
+    "ENGINE": {"AUTO": "The faster one", "TORCH": "PyTorch", "OPENCV": "OpenCV"},
+    "DEVICE": {"AUTO": "GPU if there is one", "CPU": "Processor", "CUDA": "Nvidia GPU"},
+    "DIRECTION": {"INCREASING": "Increase", "DECREASING": "Decrease"},
     "FORMAT": {
-        **{"HECTOMETRES": tr("12.3+45.67"), "KILOMETRES": tr("12+345.67")},
-        **{"GERMAN": tr("12,3 + 46"), "MILES": tr("7 mi 1181.39 yd")},
+        **{"HECTOMETRES": "12.3+45.67", "KILOMETRES": "12+345.67"},
+        **{"GERMAN": "12,3 + 46", "MILES": "7 mi 1181.39 yd"},
     },
-    "TRANSITIONS": {JUMPS: tr("Clothoids, or none"), CLOTHOIDS: tr("Clothoids everywhere")},
-    "VERTICAL_CURVES": {"CIRCLES": tr("Circles, as for railways"), "PARABOLAS": tr("Parabolas, as for roads")},
-    "TORCH": {"NONE": tr("Do not install"), "CPU": tr("For the processor (CPU)"), "CUDA": tr("For an Nvidia GPU")},
+    "TRANSITIONS": {JUMPS: "Clothoids, or none", CLOTHOIDS: "Clothoids everywhere"},
+    "VERTICAL_CURVES": {"CIRCLES": "Circles, as for railways", "PARABOLAS": "Parabolas, as for roads"},
+    "TORCH": {"NONE": "Do not install", "CPU": "For the processor (CPU)", "CUDA": "For an Nvidia GPU"},
 }
 """Words by id, by parameter."""
 
@@ -49,4 +48,4 @@ def in_words(definition: QgsProcessingParameterEnum) -> list[tuple[str, str | li
 
 
 def _joined(words: Sequence[str]) -> str:
-    return tr(" and ").join([*words[:1], *(one[:1].lower() + one[1:] for one in words[1:])]) or tr("None")
+    return " and ".join([*words[:1], *(one[:1].lower() + one[1:] for one in words[1:])]) or "None"

@@ -14,8 +14,6 @@ from qgis.core import (
     QgsProcessingParameterPointCloudLayer,
 )
 
-from ..i18n import tr
-
 SUFFIXES = ("las", "laz", "vpc")
 """Suffixes of the files that can be read; COPC files end in .copc.laz."""
 
@@ -60,4 +58,4 @@ def model_input(cloud: QgsProcessingParameterDefinition) -> QgsProcessingParamet
 def file_filter() -> str:
     """Return the filter for dialogs in which a cloud is selected."""
     patterns = " ".join(f"*.{suffix} *.{suffix.upper()}" for suffix in SUFFIXES)
-    return f"{tr('Point clouds')} ({patterns});;{tr('All files')} (*)"
+    return f"{'Point clouds'} ({patterns});;{'All files'} (*)"

@@ -15,7 +15,6 @@ from qgis.gui import QgsProcessingGui
 from qgis.PyQt.QtCore import pyqtSignal
 from qgis.PyQt.QtWidgets import QComboBox, QFileDialog, QHBoxLayout, QToolButton, QWidget
 
-from ..i18n import tr
 from .cloud_parameter import file_filter
 
 LAST_FOLDER = "/Processing/LastInputPath"
@@ -47,9 +46,9 @@ class CloudWidget(QWidget):
         self.combo.setEditable(True)
         self.combo.setInsertPolicy(QComboBox.InsertPolicy.NoInsert)
         self.combo.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
-        self.combo.lineEdit().setPlaceholderText(tr("Layer, or path of a file or folder"))
-        self.file_button = _button("…", tr("Select a file"), self._select_file)
-        self.folder_button = _button(tr("Folder…"), tr("Select a folder of point clouds"), self._select_folder)
+        self.combo.lineEdit().setPlaceholderText("Layer, or path of a file or folder")
+        self.file_button = _button("…", "Select a file", self._select_file)
+        self.folder_button = _button("Folder…", "Select a folder of point clouds", self._select_folder)
         layout = QHBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         for widget in (self.combo, self.file_button, self.folder_button):
@@ -85,10 +84,10 @@ class CloudWidget(QWidget):
             self.combo.clearEditText()
 
     def _select_file(self) -> None:
-        self._take(QFileDialog.getOpenFileName(self, tr("Select a point cloud"), self._folder(), file_filter())[0])
+        self._take(QFileDialog.getOpenFileName(self, "Select a point cloud", self._folder(), file_filter())[0])
 
     def _select_folder(self) -> None:
-        self._take(QFileDialog.getExistingDirectory(self, tr("Select a folder of point clouds"), self._folder()))
+        self._take(QFileDialog.getExistingDirectory(self, "Select a folder of point clouds", self._folder()))
 
     def _folder(self) -> str:
         """Folder in which a dialog begins."""

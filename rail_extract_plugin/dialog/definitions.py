@@ -5,14 +5,18 @@ Labels state the unit. Numbers are plain numbers, so that QGIS does not convert 
 
 from __future__ import annotations
 
+from typing import Union
+
 from qgis.core import (
     QgsProcessing,
+    QgsProcessingOutputDefinition,
     QgsProcessingParameterDefinition,
     QgsProcessingParameterEnum,
     QgsProcessingParameterNumber,
 )
 
-Definitions = tuple[QgsProcessingParameterDefinition, ...]
+Definitions = tuple[Union[QgsProcessingParameterDefinition, QgsProcessingOutputDefinition], ...]
+"""Parameters and outputs."""
 
 _TYPES = QgsProcessing.SourceType
 LINE, POINT, ANY, TABLE = _TYPES.TypeVectorLine, _TYPES.TypeVectorPoint, _TYPES.TypeVectorAnyGeometry, _TYPES.TypeVector

@@ -8,7 +8,6 @@ from pathlib import Path
 
 from qgis.core import QgsProcessingParameterDefinition
 
-from ..i18n import tr
 from .guide import guide
 from .wording import with_labels
 
@@ -18,15 +17,15 @@ ADVANCED = QgsProcessingParameterDefinition.Flag.FlagAdvanced
 
 
 PAGES = {
-    "parameters": tr("All parameters, with pictures"),
-    "reference": tr("All fields of the results"),
-    "airborne": tr("Tracks in airborne clouds"),
-    "stationing": tr("Kilometres along an axis"),
-    "alignment": tr("How elements are fitted"),
-    "comparison": tr("How surveys are compared"),
-    "tutorial": tr("Tutorial"),
-    "limits": tr("Limits"),
-    "troubleshooting": tr("If something is wrong"),
+    "parameters": "All parameters, with pictures",
+    "reference": "All fields of the results",
+    "airborne": "Tracks in airborne clouds",
+    "stationing": "Kilometres along an axis",
+    "alignment": "How elements are fitted",
+    "comparison": "How surveys are compared",
+    "tutorial": "Tutorial",
+    "limits": "Limits",
+    "troubleshooting": "If something is wrong",
 }
 """Titles of the guide's pages."""
 
@@ -51,8 +50,8 @@ def help_panel(summary: str, picture: Path | None, text: str, definitions: Defin
     prose = [escape(with_labels(line, definitions), quote=False) for line in text.split("\n") if line]
     common = [one for one in definitions if not one.flags() & ADVANCED]
     fields = [
-        *_section(tr("Parameters"), [one for one in common if not one.isDestination()], definitions),
-        *_section(tr("Results"), [one for one in common if one.isDestination()], definitions),
+        *_section("Parameters", [one for one in common if not one.isDestination()], definitions),
+        *_section("Results", [one for one in common if one.isDestination()], definitions),
     ]
     addresses = [(PAGES[page], guide(page)) for page in pages if guide(page)]
     more = " · ".join(f'<a href="{address}">{escape(title)}</a>' for title, address in addresses)

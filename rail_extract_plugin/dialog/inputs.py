@@ -19,7 +19,6 @@ from qgis.core import (
 from ...core.alignment.km_text import HECTOMETRES, NOTATIONS
 from ...core.parameters import AIRBORNE_CLASSES
 from ...core.standards import RAIL_CLASS
-from ..i18n import tr
 from .cloud_parameter import CloudParameter
 from .definitions import ANY, LINE, POINT, TABLE, UNBOUNDED, Definitions, advanced, choice, helped, number
 from .parameter_values import DIRECTIONS, INCREASING
@@ -29,15 +28,13 @@ def cloud() -> Definitions:
     """Define the parameters for the rail points."""
     return (
         helped(
-            CloudParameter("INPUT", tr("Point cloud (layer, file or folder)")),
-            tr(
-                "A loaded point cloud layer, or the path of a LAS, LAZ or COPC file, of a folder of such files, or of "
-                "a virtual point cloud (.vpc)."
-            ),
+            CloudParameter("INPUT", "Point cloud (layer, file or folder)"),
+            "A loaded point cloud layer, or the path of a LAS, LAZ or COPC file, of a folder of such files, or of "
+            "a virtual point cloud (.vpc).",
         ),
         helped(
-            QgsProcessingParameterString("RAIL_CLASSES", tr("Rail classes"), defaultValue=str(RAIL_CLASS)),
-            tr("Classes of the points on rails, such as 10 or 10,11. Each class is processed separately."),
+            QgsProcessingParameterString("RAIL_CLASSES", "Rail classes", defaultValue=str(RAIL_CLASS)),
+            "Classes of the points on rails, such as 10 or 10,11. Each class is processed separately.",
         ),
     )
 
@@ -45,33 +42,27 @@ def cloud() -> Definitions:
 def raw_cloud() -> QgsProcessingParameterDefinition:
     """Define the parameter for a cloud that nobody has classified."""
     return helped(
-        CloudParameter("INPUT", tr("Point cloud (layer, file or folder)")),
-        tr(
-            "A loaded point cloud layer, or the path of a LAS, LAZ or COPC file, of a folder of such files, or of a "
-            "virtual point cloud (.vpc). It needs no classes."
-        ),
+        CloudParameter("INPUT", "Point cloud (layer, file or folder)"),
+        "A loaded point cloud layer, or the path of a LAS, LAZ or COPC file, of a folder of such files, or of a "
+        "virtual point cloud (.vpc). It needs no classes.",
     )
 
 
 def classify() -> QgsProcessingParameterDefinition:
     """Define whether the rail points are to be found first."""
     return helped(
-        QgsProcessingParameterBoolean("CLASSIFY", tr("Find the rail points of a raw cloud"), defaultValue=False),
-        tr(
-            "For clouds that nobody has classified: finds the rail points first, as Classify Rail Points does. The "
-            "rail classes are ignored."
-        ),
+        QgsProcessingParameterBoolean("CLASSIFY", "Find the rail points of a raw cloud", defaultValue=False),
+        "For clouds that nobody has classified: finds the rail points first, as Classify Rail Points does. The "
+        "rail classes are ignored.",
     )
 
 
 def guide() -> QgsProcessingParameterDefinition:
     """Define the lines along which rails are searched."""
     return advanced(
-        QgsProcessingParameterFeatureSource("GUIDE", tr("Guide"), [LINE], optional=True),
-        tr(
-            "Lines along the tracks, from a map such as OpenStreetMap or drawn by hand. Rails are searched near them "
-            "only. Lines in another coordinate system are transformed."
-        ),
+        QgsProcessingParameterFeatureSource("GUIDE", "Guide", [LINE], optional=True),
+        "Lines along the tracks, from a map such as OpenStreetMap or drawn by hand. Rails are searched near them "
+        "only. Lines in another coordinate system are transformed.",
     )
 
 
@@ -79,17 +70,15 @@ def airborne_cloud() -> Definitions:
     """Define the parameters for an airborne cloud."""
     return (
         helped(
-            CloudParameter("INPUT", tr("Airborne point cloud (layer, file or folder)")),
-            tr(
-                "A loaded point cloud layer, or the path of a LAS, LAZ or COPC file, of a folder of such files, or of "
-                "a virtual point cloud (.vpc)."
-            ),
+            CloudParameter("INPUT", "Airborne point cloud (layer, file or folder)"),
+            "A loaded point cloud layer, or the path of a LAS, LAZ or COPC file, of a folder of such files, or of "
+            "a virtual point cloud (.vpc).",
         ),
         advanced(
             QgsProcessingParameterString(
-                "CLASSES", tr("Classes"), defaultValue=",".join(map(str, AIRBORNE_CLASSES)), optional=True
+                "CLASSES", "Classes", defaultValue=",".join(map(str, AIRBORNE_CLASSES)), optional=True
             ),
-            tr("Classes of the points to use: by default unclassified and ground. Empty uses all but noise."),
+            "Classes of the points to use: by default unclassified and ground. Empty uses all but noise.",
         ),
     )
 
@@ -97,11 +86,9 @@ def airborne_cloud() -> Definitions:
 def tracks_meant() -> QgsProcessingParameterDefinition:
     """Define the lines that say which tracks are meant."""
     return helped(
-        QgsProcessingParameterFeatureSource("GUIDE", tr("Guide"), [LINE], optional=True),
-        tr(
-            "One line for each track of the railway, such as railway=rail of OpenStreetMap, up to 3 m off. Give every "
-            "track its guide: they are fitted together. Leave empty to have guides proposed."
-        ),
+        QgsProcessingParameterFeatureSource("GUIDE", "Guide", [LINE], optional=True),
+        "One line for each track of the railway, such as railway=rail of OpenStreetMap, up to 3 m off. Give every "
+        "track its guide: they are fitted together. Leave empty to have guides proposed.",
     )
 
 
@@ -109,15 +96,13 @@ def seeds() -> Definitions:
     """Define the places from which rails are followed."""
     return (
         helped(
-            QgsProcessingParameterFeatureSource("SEEDS", tr("Seeds"), [POINT, LINE], optional=True),
-            tr(
-                "Points on railheads, or lines along them, one for each rail or track to follow. In another coordinate "
-                "system they are transformed. The map tool Grow Rails makes such a layer."
-            ),
+            QgsProcessingParameterFeatureSource("SEEDS", "Seeds", [POINT, LINE], optional=True),
+            "Points on railheads, or lines along them, one for each rail or track to follow. In another coordinate "
+            "system they are transformed. The map tool Grow Rails makes such a layer.",
         ),
         helped(
-            QgsProcessingParameterPoint("SEED", tr("Seed on the map"), optional=True),
-            tr("A single place on a railhead, picked on the map, besides the layer or instead of it."),
+            QgsProcessingParameterPoint("SEED", "Seed on the map", optional=True),
+            "A single place on a railhead, picked on the map, besides the layer or instead of it.",
         ),
     )
 
@@ -125,70 +110,65 @@ def seeds() -> Definitions:
 def seeds_in_raw() -> QgsProcessingParameterDefinition:
     """Define the places in a raw cloud from which rails grow that are to be extracted."""
     return advanced(
-        QgsProcessingParameterFeatureSource("SEEDS", tr("Seeds in a raw cloud"), [POINT, LINE], optional=True),
-        tr(
-            "Points on railheads, or lines along them: only the rails that grow from these are extracted, as Grow Rail "
-            "Points from Seeds follows them. The rail classes are ignored."
-        ),
+        QgsProcessingParameterFeatureSource("SEEDS", "Seeds in a raw cloud", [POINT, LINE], optional=True),
+        "Points on railheads, or lines along them: only the rails that grow from these are extracted, as Grow Rail "
+        "Points from Seeds follows them. The rail classes are ignored.",
     )
 
 
 def merge_classes() -> QgsProcessingParameterDefinition:
     """Define whether the rail classes are to be taken for one."""
     return advanced(
-        QgsProcessingParameterBoolean("MERGE_CLASSES", tr("Take all rail classes for one"), defaultValue=False),
-        tr("For tracks whose rails, or parts of rails, are of different classes. The results have the first class."),
+        QgsProcessingParameterBoolean("MERGE_CLASSES", "Take all rail classes for one", defaultValue=False),
+        "For tracks whose rails, or parts of rails, are of different classes. The results have the first class.",
     )
 
 
 def raster() -> QgsProcessingParameterDefinition:
     """Define the parameter for a rail raster."""
     return helped(
-        QgsProcessingParameterRasterLayer("INPUT", tr("Rail raster")),
-        tr("One band per class, with 1 where there is rail, as from Rasterize Rail Points. North up, square cells."),
+        QgsProcessingParameterRasterLayer("INPUT", "Rail raster"),
+        "One band per class, with 1 where there is rail, as from Rasterize Rail Points. North up, square cells.",
     )
 
 
 def points() -> QgsProcessingParameterDefinition:
     """Define the parameter for the points that give lines their heights."""
     return helped(
-        CloudParameter("POINTS", tr("Point cloud (layer, file or folder)"), optional=True),
-        tr("The cloud from which the raster was made: it moves the lines onto the railheads and gives them heights."),
+        CloudParameter("POINTS", "Point cloud (layer, file or folder)", optional=True),
+        "The cloud from which the raster was made: it moves the lines onto the railheads and gives them heights.",
     )
 
 
 def rails() -> QgsProcessingParameterDefinition:
     """Define the parameter for the rails."""
     return helped(
-        QgsProcessingParameterFeatureSource("INPUT", tr("Rails"), [LINE]),
-        tr("Lines of railheads, from Vectorize Rails or drawn by hand."),
+        QgsProcessingParameterFeatureSource("INPUT", "Rails", [LINE]),
+        "Lines of railheads, from Vectorize Rails or drawn by hand.",
     )
 
 
 def centerlines() -> QgsProcessingParameterDefinition:
     """Define the parameter for the track centerlines."""
     return helped(
-        QgsProcessingParameterFeatureSource("INPUT", tr("Track centerlines"), [LINE]),
-        tr(
-            "Lines midway between rails, from Build Track Centerlines or drawn by hand. Chainage is measured along "
-            "them."
-        ),
+        QgsProcessingParameterFeatureSource("INPUT", "Track centerlines", [LINE]),
+        "Lines midway between rails, from Build Track Centerlines or drawn by hand. Chainage is measured along them.",
     )
 
 
 def rails_of_tracks() -> QgsProcessingParameterDefinition:
     """Define the parameter for the rails of the centerlines."""
     return helped(
-        QgsProcessingParameterFeatureSource("RAILS", tr("Rails"), [LINE]),
-        tr("The rails of these tracks: those named in left_ids and right_ids, otherwise the nearest."),
+        QgsProcessingParameterFeatureSource("RAILS", "Rails", [LINE]),
+        "The rails of these tracks: those named in left_ids and right_ids, otherwise the nearest.",
     )
 
 
 def points_of_rails() -> QgsProcessingParameterDefinition:
     """Define the parameter for the points that support the rails."""
     return helped(
-        CloudParameter("POINTS", tr("Point cloud (layer, file or folder)"), optional=True),
-        tr("The cloud from which the rails were extracted: it gives heights, sigma_mm and points for each station."),
+        CloudParameter("POINTS", "Point cloud (layer, file or folder)", optional=True),
+        "The cloud from which the rails were extracted: it gives heights, sigma_mm and points for each station.",
     )
 
 
@@ -196,12 +176,12 @@ def elements() -> Definitions:
     """Define the parameters for an element table."""
     return (
         helped(
-            QgsProcessingParameterFeatureSource("INPUT", tr("Elements"), [TABLE]),
-            tr("Element table of Fit Alignment or Import Alignment; it may be edited. Its geometries are not used."),
+            QgsProcessingParameterFeatureSource("INPUT", "Elements", [TABLE]),
+            "Element table of Fit Alignment or Import Alignment; it may be edited. Its geometries are not used.",
         ),
         advanced(
-            QgsProcessingParameterCrs("CRS", tr("CRS of a table without one"), optional=True),
-            tr("Projected coordinate system in metres for a table without geometries; other tables keep their own."),
+            QgsProcessingParameterCrs("CRS", "CRS of a table without one", optional=True),
+            "Projected coordinate system in metres for a table without geometries; other tables keep their own.",
         ),
     )
 
@@ -209,11 +189,9 @@ def elements() -> Definitions:
 def tracks_beside_design() -> QgsProcessingParameterDefinition:
     """Define the measured tracks that are compared with a design."""
     return helped(
-        QgsProcessingParameterFeatureSource("TRACKS", tr("Measured tracks"), [LINE], optional=True),
-        tr(
-            "Centerlines that lie along the alignments, for deviations and report; each is compared with the alignment "
-            "beside it, up to 2 m away."
-        ),
+        QgsProcessingParameterFeatureSource("TRACKS", "Measured tracks", [LINE], optional=True),
+        "Centerlines that lie along the alignments, for deviations and report; each is compared with the alignment "
+        "beside it, up to 2 m away.",
     )
 
 
@@ -221,12 +199,12 @@ def cant_beside_design() -> Definitions:
     """Define the layers from which the cant of measured tracks is known, where it is compared with a design."""
     return (
         advanced(
-            QgsProcessingParameterFeatureSource("QUALITY", tr("Track geometry"), [POINT], optional=True),
-            tr("Points of Extract Rails or Measure Track Geometry for these tracks, with the cant."),
+            QgsProcessingParameterFeatureSource("QUALITY", "Track geometry", [POINT], optional=True),
+            "Points of Extract Rails or Measure Track Geometry for these tracks, with the cant.",
         ),
         advanced(
-            QgsProcessingParameterFeatureSource("RAILS", tr("Rails"), [LINE], optional=True),
-            tr("3D lines of both rails, for the cant where there is no track geometry."),
+            QgsProcessingParameterFeatureSource("RAILS", "Rails", [LINE], optional=True),
+            "3D lines of both rails, for the cant where there is no track geometry.",
         ),
     )
 
@@ -234,44 +212,42 @@ def cant_beside_design() -> Definitions:
 def landxml() -> Definitions:
     """Define the parameters for a LandXML file."""
     behaviour = QgsProcessingParameterFile.Behavior.File
-    kinds = tr("LandXML files (*.xml *.landxml);;All files (*)")
+    kinds = "LandXML files (*.xml *.landxml);;All files (*)"
     return (
         helped(
-            QgsProcessingParameterFile("INPUT", tr("LandXML file"), behaviour, fileFilter=kinds),
-            tr("LandXML 1.0 to 1.2 in metres, with alignments of lines, arcs and clothoids."),
+            QgsProcessingParameterFile("INPUT", "LandXML file", behaviour, fileFilter=kinds),
+            "LandXML 1.0 to 1.2 in metres, with alignments of lines, arcs and clothoids.",
         ),
         advanced(
-            QgsProcessingParameterCrs("CRS", tr("CRS of a file without one"), optional=True),
-            tr("Projected coordinate system in metres for a file that does not state one; other files keep their own."),
+            QgsProcessingParameterCrs("CRS", "CRS of a file without one", optional=True),
+            "Projected coordinate system in metres for a file that does not state one; other files keep their own.",
         ),
         advanced(
-            QgsProcessingParameterBoolean("EAST_FIRST", tr("Points are written easting first"), defaultValue=False),
-            tr(
-                "For files that, against the format, write the easting of points before their northing. All curves of "
-                "such a file turn to the other side than it states."
-            ),
+            QgsProcessingParameterBoolean("EAST_FIRST", "Points are written easting first", defaultValue=False),
+            "For files that, against the format, write the easting of points before their northing. All curves of "
+            "such a file turn to the other side than it states.",
         ),
     )
 
 
 def surveys() -> Definitions:
     """Define the lines that are compared, and the rails of their tracks."""
-    rails = tr("For centerlines: the rails of these tracks, for differences of gauge and cant.")
+    rails = "For centerlines: the rails of these tracks, for differences of gauge and cant."
     return (
         helped(
-            QgsProcessingParameterFeatureSource("REFERENCE", tr("Reference"), [LINE]),
-            tr("Rails or centerlines of the earlier survey, of the design, or of a control measurement."),
+            QgsProcessingParameterFeatureSource("REFERENCE", "Reference", [LINE]),
+            "Rails or centerlines of the earlier survey, of the design, or of a control measurement.",
         ),
         helped(
-            QgsProcessingParameterFeatureSource("INPUT", tr("Lines to compare"), [LINE]),
-            tr("The same kind of lines of the later survey, in the same coordinate system."),
+            QgsProcessingParameterFeatureSource("INPUT", "Lines to compare", [LINE]),
+            "The same kind of lines of the later survey, in the same coordinate system.",
         ),
         advanced(
-            QgsProcessingParameterFeatureSource("REFERENCE_RAILS", tr("Rails of the reference"), [LINE], optional=True),
+            QgsProcessingParameterFeatureSource("REFERENCE_RAILS", "Rails of the reference", [LINE], optional=True),
             rails,
         ),
         advanced(
-            QgsProcessingParameterFeatureSource("RAILS", tr("Rails to compare"), [LINE], optional=True),
+            QgsProcessingParameterFeatureSource("RAILS", "Rails to compare", [LINE], optional=True),
             rails,
         ),
     )
@@ -280,8 +256,8 @@ def surveys() -> Definitions:
 def places() -> QgsProcessingParameterDefinition:
     """Define the layer whose features are to get kilometres."""
     return helped(
-        QgsProcessingParameterFeatureSource("INPUT", tr("Layer"), [ANY]),
-        tr("Points, lines or polygons. A line counts where it is half way, a polygon at a place inside."),
+        QgsProcessingParameterFeatureSource("INPUT", "Layer", [ANY]),
+        "Points, lines or polygons. A line counts where it is half way, a polygon at a place inside.",
     )
 
 
@@ -290,19 +266,17 @@ def axis(optional: bool) -> Definitions:
     show = advanced if optional else helped
     return (
         show(
-            QgsProcessingParameterFeatureSource("AXIS", tr("Axis"), [LINE], optional=optional),
-            tr(
-                "Line that carries the kilometres: with M values in kilometres or metres, or with the fields below. In "
-                "another coordinate system it is transformed."
-            ),
+            QgsProcessingParameterFeatureSource("AXIS", "Axis", [LINE], optional=optional),
+            "Line that carries the kilometres: with M values in kilometres or metres, or with the fields below. In "
+            "another coordinate system it is transformed.",
         ),
         show(
-            number("START_KM", tr("Start of the axis [km]"), minimum=-UNBOUNDED, optional=True, decimals=6),
-            tr("Kilometre at the first vertex of the axis, for an axis that is a single line. It overrides M values."),
+            number("START_KM", "Start of the axis [km]", minimum=-UNBOUNDED, optional=True, decimals=6),
+            "Kilometre at the first vertex of the axis, for an axis that is a single line. It overrides M values.",
         ),
         advanced(
-            choice("DIRECTION", tr("Kilometres along the axis"), DIRECTIONS, INCREASING),
-            tr("Whether kilometres increase or decrease from the start of the axis; used with its start kilometre."),
+            choice("DIRECTION", "Kilometres along the axis", DIRECTIONS, INCREASING),
+            "Whether kilometres increase or decrease from the start of the axis; used with its start kilometre.",
         ),
         *_posts(show),
     )
@@ -310,36 +284,28 @@ def axis(optional: bool) -> Definitions:
 
 def _posts(show: Callable[..., QgsProcessingParameterDefinition]) -> Definitions:
     """Define what else states kilometres, and how they are written; `show` shows the posts."""
-    posts = QgsProcessingParameterFeatureSource("POSTS", tr("Kilometre posts"), [POINT], optional=True)
+    posts = QgsProcessingParameterFeatureSource("POSTS", "Kilometre posts", [POINT], optional=True)
     kinds = QgsProcessingParameterField.DataType
     field = QgsProcessingParameterField(
-        "POST_FIELD", tr("Field of the posts with the kilometre"), None, "POSTS", kinds.Any, False, True
+        "POST_FIELD", "Field of the posts with the kilometre", None, "POSTS", kinds.Any, False, True
     )
-    jumps = QgsProcessingParameterFeatureSource("JUMPS", tr("Jumps of the kilometres"), [TABLE], optional=True)
+    jumps = QgsProcessingParameterFeatureSource("JUMPS", "Jumps of the kilometres", [TABLE], optional=True)
     return (
         show(
             posts,
-            tr(
-                "Points of kilometre or hectometre posts up to 50 m beside the axis. Kilometres are interpolated "
-                "between them. They override the start and M values."
-            ),
+            "Points of kilometre or hectometre posts up to 50 m beside the axis. Kilometres are interpolated "
+            "between them. They override the start and M values.",
         ),
-        advanced(
-            field, tr("Numbers, or texts such as 12.3+45. Empty means the first of km, kilometre, km_text, station.")
-        ),
+        advanced(field, "Numbers, or texts such as 12.3+45. Empty means the first of km, kilometre, km_text, station."),
         advanced(
             jumps,
-            tr(
-                "Table with the fields km_back, the kilometre before each jump, and km_ahead, the one behind it, in "
-                "the order of increasing kilometres."
-            ),
+            "Table with the fields km_back, the kilometre before each jump, and km_ahead, the one behind it, in "
+            "the order of increasing kilometres.",
         ),
         advanced(
-            choice("FORMAT", tr("Kilometres as text"), tuple(NOTATIONS), HECTOMETRES),
-            tr(
-                "HECTOMETRES writes 12.3+45.67, KILOMETRES 12+345.67, GERMAN 12,3 + 46, and MILES 7 mi 1181.39 yd, in "
-                "miles and yards."
-            ),
+            choice("FORMAT", "Kilometres as text", tuple(NOTATIONS), HECTOMETRES),
+            "HECTOMETRES writes 12.3+45.67, KILOMETRES 12+345.67, GERMAN 12,3 + 46, and MILES 7 mi 1181.39 yd, in "
+            "miles and yards.",
         ),
     )
 
@@ -347,8 +313,8 @@ def _posts(show: Callable[..., QgsProcessingParameterDefinition]) -> Definitions
 def tracks_to_fit() -> QgsProcessingParameterDefinition:
     """Define the parameter for the tracks whose design is wanted."""
     return helped(
-        QgsProcessingParameterFeatureSource("INPUT", tr("Track centerlines"), [LINE]),
-        tr("3D lines of tracks, such as the centerlines of Extract Rails. A field track_id numbers them."),
+        QgsProcessingParameterFeatureSource("INPUT", "Track centerlines", [LINE]),
+        "3D lines of tracks, such as the centerlines of Extract Rails. A field track_id numbers them.",
     )
 
 
@@ -356,15 +322,13 @@ def cant_of_tracks() -> Definitions:
     """Define the layers from which the cant of tracks is known."""
     return (
         helped(
-            QgsProcessingParameterFeatureSource("QUALITY", tr("Track geometry"), [POINT], optional=True),
-            tr(
-                "Points of Extract Rails or Measure Track Geometry for these tracks: their cant gives elements, and "
-                "sections without rail points do not count."
-            ),
+            QgsProcessingParameterFeatureSource("QUALITY", "Track geometry", [POINT], optional=True),
+            "Points of Extract Rails or Measure Track Geometry for these tracks: their cant gives elements, and "
+            "sections without rail points do not count.",
         ),
         advanced(
-            QgsProcessingParameterFeatureSource("RAILS", tr("Rails"), [LINE], optional=True),
-            tr("3D lines of both rails, for the cant where there is no track geometry."),
+            QgsProcessingParameterFeatureSource("RAILS", "Rails", [LINE], optional=True),
+            "3D lines of both rails, for the cant where there is no track geometry.",
         ),
     )
 
@@ -372,9 +336,7 @@ def cant_of_tracks() -> Definitions:
 def fixed() -> QgsProcessingParameterDefinition:
     """Define the parameter for a corrected table of elements."""
     return advanced(
-        QgsProcessingParameterFeatureSource("FIXED", tr("Corrected elements"), [TABLE], optional=True),
-        tr(
-            "Elements of an earlier run that you have corrected. Their types are held, and radii and starts that you "
-            "changed; the rest is fitted again."
-        ),
+        QgsProcessingParameterFeatureSource("FIXED", "Corrected elements", [TABLE], optional=True),
+        "Elements of an earlier run that you have corrected. Their types are held, and radii and starts that you "
+        "changed; the rest is fitted again.",
     )

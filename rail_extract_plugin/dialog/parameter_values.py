@@ -15,6 +15,8 @@ from qgis.core import (
     QgsProcessingAlgorithm,
     QgsProcessingContext,
     QgsProcessingFeatureSource,
+    QgsProcessingOutputLayerDefinition,
+    QgsProperty,
     QgsWkbTypes,
 )
 
@@ -34,6 +36,7 @@ from ...core.standards import (
 from ..reading.clouds import CloudSource, checked_crs, cloud_source
 from ..setup.interpreter import known_interpreter
 from ..systems import prepare_system, system
+from .passwords import masked
 
 if TYPE_CHECKING:
     import numpy as np
@@ -94,12 +97,17 @@ class ParameterValues:
     parameters : dict
         Values by name, as QGIS passes them.
     context : QgsProcessingContext
+
+    Attributes
+    ----------
+    algorithm, parameters, context
+        As given, for the functions that write outputs.
     """
 
     def __init__(
         self, algorithm: QgsProcessingAlgorithm, parameters: dict[str, Any], context: QgsProcessingContext
     ) -> None:
-        self._algorithm, self._parameters, self._context = algorithm, parameters, context
+        self.algorithm, self.parameters, self.context = algorithm, parameters, context
 
     def number(self, name: str) -> float:
         """Read a number.
@@ -109,7 +117,7 @@ class ParameterValues:
         ParameterError
             The value is NaN, which QGIS accepts.
         """
-        number = self._algorithm.parameterAsDouble(self._parameters, name, self._context)
+        number = self.algorithm.parameterAsDouble(self.parameters, name, self.context)
         if math.isnan(number):
             raise ParameterError(f"{name} can't be nan: give a number.")
         return number
@@ -126,19 +134,40 @@ class ParameterValues:
 
     def flag(self, name: str) -> bool:
         """Read a choice of yes or no."""
-        return self._algorithm.parameterAsBoolean(self._parameters, name, self._context)
+        return self.algorithm.parameterAsBoolean(self.parameters, name, self.context)
 
     def text(self, name: str) -> str:
         """Read a text."""
-        return self._algorithm.parameterAsString(self._parameters, name, self._context)
+        return self.algorithm.parameterAsString(self.parameters, name, self.context)
 
     def choice(self, name: str) -> str:
         """Read the static string of an enum."""
-        return self._algorithm.parameterAsEnumString(self._parameters, name, self._context)
+        return self.algorithm.parameterAsEnumString(self.parameters, name, self.context)
 
     def filled(self, name: str) -> bool:
         """Return whether a value was entered."""
-        return self._parameters.get(name) not in (None, "", NULL)
+        return self.parameters.get(name) not in (None, "", NULL)
+
+    def file(self, name: str) -> Path | None:
+        """Read a file that may be left empty."""
+        given = self.algorithm.parameterAsFile(self.parameters, name, self.context)
+        return Path(given) if given else None
+
+    def wanted(self, name: str) -> bool:
+        """Return whether an output is to be written; the batch dialog gives an empty definition for a skipped one."""
+        return bool(destination_text(self.parameters.get(name), self.context))
+
+    def output_file(self, name: str) -> str:
+        """Return the file of an output; QGIS chooses the name of a temporary one during the run."""
+        return self.algorithm.parameterAsFileOutput(self.parameters, name, self.context)
+
+    def command(self) -> str:
+        """Return the command that repeats the run, without passwords."""
+        return masked(self.algorithm.asPythonCommand(self.parameters, self.context))
+
+    def rails_only(self) -> bool:
+        """Return whether CONTENT leaves out what is not on rails."""
+        return self.algorithm.parameterAsEnum(self.parameters, "CONTENT", self.context) == 1
 
     def raster(self, name: str) -> tuple[Path, RasterHeader]:
         """Return the file of a raster and its header.
@@ -150,7 +179,7 @@ class ParameterValues:
         """
         from ..reading.geotiff import read_header
 
-        layer = self._algorithm.parameterAsRasterLayer(self._parameters, name, self._context)
+        layer = self.algorithm.parameterAsRasterLayer(self.parameters, name, self.context)
         if layer is None:
             raise RasterError(f"{name} is not a readable raster: give the output of Rasterize Rail Points.")
         path = Path(layer.source())
@@ -187,7 +216,7 @@ class ParameterValues:
             if self.flag("ONLY_GUIDED"):
                 raise ParameterError("ONLY_GUIDED needs lines to compare tracks with: choose GUIDE.")
             return ()
-        return read_guide(self._line_source("GUIDE"), system(checked_crs(cloud)), self._context)
+        return read_guide(self._line_source("GUIDE"), system(checked_crs(cloud)), self.context)
 
     def tracks_meant(self, cloud: CloudSource) -> tuple[Guide, ...]:
         """Read the lines of GUIDE with what the layer states of them; none if it is empty.
@@ -201,7 +230,7 @@ class ParameterValues:
 
         if not self.filled("GUIDE"):
             return ()
-        return read_tracks_meant(self._line_source("GUIDE"), system(checked_crs(cloud)), self._context)
+        return read_tracks_meant(self._line_source("GUIDE"), system(checked_crs(cloud)), self.context)
 
     def airborne(self, standard: RailStandard) -> AirborneParameters:
         """Read how tracks are looked for in an airborne cloud."""
@@ -236,7 +265,7 @@ class ParameterValues:
         start = None if start_km is None else Start(start_km, self.choice("DIRECTION") == DECREASING)
         posts, jumps = (self.table(name) if self.filled(name) else None for name in ("POSTS", "JUMPS"))
         sources = AxisSources(self._line_source("AXIS"), start, posts, self.text("POST_FIELD"), jumps)
-        return read_axes(sources, crs, self.choice("FORMAT"), self._context)
+        return read_axes(sources, crs, self.choice("FORMAT"), self.context)
 
     def axis_crs(self) -> QgsCoordinateReferenceSystem:
         """Return the coordinate system of AXIS."""
@@ -244,7 +273,7 @@ class ParameterValues:
 
     def table(self, name: str) -> QgsProcessingFeatureSource:
         """Return a layer or a table."""
-        source = self._algorithm.parameterAsSource(self._parameters, name, self._context)
+        source = self.algorithm.parameterAsSource(self.parameters, name, self.context)
         if source is None:
             raise RailExtractError(f"{name} is not a readable layer: choose another one.")
         return source
@@ -264,14 +293,14 @@ class ParameterValues:
         crs = system(checked_crs(cloud))
         found: tuple[np.ndarray, ...] = ()
         if self.filled("SEEDS"):
-            source = self._algorithm.parameterAsSource(self._parameters, "SEEDS", self._context)
+            source = self.algorithm.parameterAsSource(self.parameters, "SEEDS", self.context)
             if source is None:
                 raise RailExtractError("SEEDS is not a readable layer: give a layer of points or lines.")
-            found = read_seeds(source, crs, self._context)
+            found = read_seeds(source, crs, self.context)
         if self.filled("SEED"):
-            place = self._algorithm.parameterAsPoint(self._parameters, "SEED", self._context)
-            own = self._algorithm.parameterAsPointCrs(self._parameters, "SEED", self._context)
-            found = (*found, read_place(place, own, crs, self._context))
+            place = self.algorithm.parameterAsPoint(self.parameters, "SEED", self.context)
+            own = self.algorithm.parameterAsPointCrs(self.parameters, "SEED", self.context)
+            found = (*found, read_place(place, own, crs, self.context))
         return found
 
     def growth(self) -> GrowParameters:
@@ -291,20 +320,20 @@ class ParameterValues:
             return None
         from ..reading.line_layers import read_mask
 
-        source = self._algorithm.parameterAsSource(self._parameters, "MASK", self._context)
+        source = self.algorithm.parameterAsSource(self.parameters, "MASK", self.context)
         if source is None:
             raise RailExtractError("MASK is not a readable layer: give a polygon layer.")
-        return read_mask(source, system(checked_crs(cloud)), self._context)
+        return read_mask(source, system(checked_crs(cloud)), self.context)
 
     def _left_out(self) -> tuple[str, ...]:
         """Read LEAVE_OUT; nothing where an algorithm does not have it."""
         if not self._has("LEAVE_OUT"):
             return ()
-        return tuple(self._algorithm.parameterAsEnumStrings(self._parameters, "LEAVE_OUT", self._context))
+        return tuple(self.algorithm.parameterAsEnumStrings(self.parameters, "LEAVE_OUT", self.context))
 
     def _line_source(self, name: str) -> QgsProcessingFeatureSource:
         """Return a layer that may have lines."""
-        source = self._algorithm.parameterAsSource(self._parameters, name, self._context)
+        source = self.algorithm.parameterAsSource(self.parameters, name, self.context)
         if source is None:
             raise RailExtractError(f"{name} is not a readable layer: give a line layer.")
         kind = source.wkbType()
@@ -316,7 +345,7 @@ class ParameterValues:
 
     def cloud(self, name: str) -> CloudSource:
         """Return the files of a cloud; the parameter CRS, if any, applies to files that state no coordinate system."""
-        source = cloud_source(self._parameters.get(name), self._context)
+        source = cloud_source(self.parameters.get(name), self.context)
         crs = self.projected_crs()
         source = replace(source, crs_wkt=crs.toWkt()) if crs.isValid() else source
         prepare_system(checked_crs(source))
@@ -330,9 +359,9 @@ class ParameterValues:
         ParameterError
             It is not a coordinate system, or it is in degrees.
         """
-        crs = self._algorithm.parameterAsCrs(self._parameters, "CRS", self._context)
+        crs = self.algorithm.parameterAsCrs(self.parameters, "CRS", self.context)
         if self.filled("CRS") and not crs.isValid():
-            raise ParameterError(f"CRS {self._parameters['CRS']} is not a coordinate system: choose one from the list.")
+            raise ParameterError(f"CRS {self.parameters['CRS']} is not a coordinate system: choose one from the list.")
         if crs.isGeographic():
             raise ParameterError(
                 f"CRS {crs.authid()} is in degrees, where lengths can't be measured: choose a projected one."
@@ -349,7 +378,7 @@ class ParameterValues:
         """
         if not self.filled("EXTENT"):
             return None
-        extent = self._algorithm.parameterAsExtent(self._parameters, "EXTENT", self._context, crs)
+        extent = self.algorithm.parameterAsExtent(self.parameters, "EXTENT", self.context, crs)
         if extent.isEmpty() or not extent.isFinite():
             raise ParameterError(
                 "EXTENT has no area, or an infinite one: give a rectangle as xmin,xmax,ymin,ymax, or leave it empty."
@@ -372,8 +401,7 @@ class ParameterValues:
         """
         from ...core.learned.model import weights_for
 
-        given = self._algorithm.parameterAsFile(self._parameters, "WEIGHTS", self._context)
-        return weights_for(self.choice("METHOD"), Path(given) if given else None)
+        return weights_for(self.choice("METHOD"), self.file("WEIGHTS"))
 
     def class_codes(self) -> tuple[int, ...]:
         """Read RAIL_CLASSES."""
@@ -414,7 +442,16 @@ class ParameterValues:
         return Parameters(standard.gauge_m, standard.head_width_m, **given).with_gauges(other_gauges)
 
     def _has(self, name: str) -> bool:
-        return self._algorithm.parameterDefinition(name) is not None
+        return self.algorithm.parameterDefinition(name) is not None
+
+
+def destination_text(value: Any, context: QgsProcessingContext) -> str:
+    """Return a destination as a user writes it; empty if there is none."""
+    if isinstance(value, QgsProcessingOutputLayerDefinition):
+        value = value.sink
+    if isinstance(value, QgsProperty):
+        value = value.valueAsString(context.expressionContext())[0]
+    return value or ""
 
 
 def class_numbers(text: str, what: str) -> tuple[int, ...]:

@@ -2,31 +2,29 @@
 
 from __future__ import annotations
 
-from ..i18n import tr
-
 SECTIONS = {
-    tr("Cloud"): ("MERGE_CLASSES", "CLASSES", "EXTENT", "MASK", "CRS", "LEAVE_OUT"),
-    tr("Raw clouds"): (
+    "Cloud": ("MERGE_CLASSES", "CLASSES", "EXTENT", "MASK", "CRS", "LEAVE_OUT"),
+    "Raw clouds": (
         *("METHOD", "WEIGHTS", "SEEDS", "SEED", "GUIDE", "GUIDE_DISTANCE", "ONLY_GUIDED", "KEEP_SINGLE", "RAIL_CLASS"),
         *("CONTENT", "RESET", "START", "BOTH", "SEARCH", "THICKNESS", "WINDOW", "MIN_HEIGHT", "MAX_OUTLIERS"),
         "MAX_LENGTH",
     ),
-    tr("Network"): ("MODEL", "ITERATIONS", "ENGINE", "DEVICE"),
-    tr("Lines"): (
+    "Network": ("MODEL", "ITERATIONS", "ENGINE", "DEVICE"),
+    "Lines": (
         *("SMOOTHING_XY", "SMOOTHING_Z", "TOLERANCE_XY", "TOLERANCE_Z", "CROWN_RADIUS", "MAX_GAP", "GAP_ANGLE"),
         *("SIMPLIFY_XY", "SIMPLIFY_Z", "MIN_LENGTH", "STRIPS"),
     ),
-    tr("Tracks"): (
+    "Tracks": (
         *("GAUGE", "HEAD_WIDTH", "OTHER_GAUGES", "CENTERLINE_TOLERANCE", "RAIL_HEIGHT", "REFERENCE_RAILS", "QUALITY"),
         *("RAILS", "REFERENCE_SIGMA", "INPUT_SIGMA", "REACH", "STEP", "TRANSITIONS", "ROUND", "FIXED"),
     ),
-    tr("Axis"): ("AXIS", "START_KM", "POSTS", "POST_FIELD", "JUMPS", "DIRECTION", "FORMAT"),
-    tr("Computer"): ("WORKERS",),
-    tr("Files of alignments"): ("VERTICAL_CURVES", "EAST_FIRST"),
+    "Axis": ("AXIS", "START_KM", "POSTS", "POST_FIELD", "JUMPS", "DIRECTION", "FORMAT"),
+    "Computer": ("WORKERS",),
+    "Files of alignments": ("VERTICAL_CURVES", "EAST_FIRST"),
 }
 """Parameters by section."""
 
-OTHERS, RESULTS = tr("Others"), tr("More results")
+OTHERS, RESULTS = "Others", "More results"
 """The last sections: of parameters that `SECTIONS` does not list, and of outputs."""
 
 

@@ -12,7 +12,6 @@ from ...core.errors import Cancelled, OffCloudError, OffRailError, RailExtractEr
 from ...core.parameters import GrowParameters
 from ...core.standards import SEARCHED_CLASSES, RailStandard
 from ..feedback import TaskProgress
-from ..i18n import tr
 from ..reading.clouds import CloudSource, points_folder
 
 if TYPE_CHECKING:
@@ -64,7 +63,7 @@ class GrowTask(QgsTask):
         except Cancelled:
             return False
         except OffCloudError:
-            self._shown = Shown(text=tr("The cloud has no point here: click on a rail of the cloud."))
+            self._shown = Shown(text="The cloud has no point here: click on a rail of the cloud.")
         except OffRailError:
             self._shown = Shown(text=_missed())
         except RailExtractError as error:
@@ -102,6 +101,7 @@ class GrowTask(QgsTask):
 
 def _missed() -> str:
     """Say to someone who clicked that there is no rail."""
-    return tr(
-        "No railhead within {:.0f} cm of the click: zoom in and click on one, or choose another rail standard."
-    ).format(100 * GrowParameters.search_m)
+    return (
+        f"No railhead within {100 * GrowParameters.search_m:.0f} cm of the click: zoom in and click on one, or choose "
+        "another rail standard."
+    )

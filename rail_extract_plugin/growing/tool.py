@@ -36,7 +36,6 @@ from ..algorithms.grow_rail_points import GrowRailPoints
 from ..dialog.cloud_parameter import file_filter
 from ..dialog.standard_setting import LAST
 from ..dialog.wheel import ignore_wheel
-from ..i18n import tr
 from ..notices import notices
 from ..paths import ICONS
 from ..reading.clouds import checked_crs, cloud_source
@@ -137,14 +136,14 @@ class GrowRails(QObject):
         self.dialog: QWidget | None = None
         self.message = ""
         self.tool = ClickTool(canvas, self.click, self.undo, self.accept)
-        self.grow_action = self._action("growrailpoints.svg", tr("Grow Rails"), lambda: canvas.setMapTool(self.tool))
+        self.grow_action = self._action("growrailpoints.svg", "Grow Rails", lambda: canvas.setMapTool(self.tool))
         self.grow_action.setCheckable(True)
-        self.grow_action.setToolTip(tr("Click rails on a point cloud and see how far they can be followed"))
+        self.grow_action.setToolTip("Click rails on a point cloud and see how far they can be followed")
         self.tool.setAction(self.grow_action)
-        self.undo_action = self._action("undo.svg", tr("Undo Last Rail"), self.undo)
-        self.accept_action = self._action("accept.svg", tr("Classify Grown Rails…"), self.accept)
+        self.undo_action = self._action("undo.svg", "Undo Last Rail", self.undo)
+        self.accept_action = self._action("accept.svg", "Classify Grown Rails…", self.accept)
         self.standards = QComboBox()
-        self.standards.setToolTip(tr("Rail standard of the rails that are clicked"))
+        self.standards.setToolTip("Rail standard of the rails that are clicked")
         for name, standard in STANDARDS.items():
             self.standards.addItem(standard.label, name)
         self._choose_standard(DEFAULT)
@@ -179,7 +178,7 @@ class GrowRails(QObject):
     def click(self, place: QgsPointXY) -> None:
         """Follow the rail at a place in the coordinate system of the map."""
         if self.is_growing:
-            self._say(tr("The rail of the last click is still growing: wait, or undo it."))
+            self._say("The rail of the last click is still growing: wait, or undo it.")
             return
         try:
             value = self._chosen_cloud()
@@ -213,24 +212,24 @@ class GrowRails(QObject):
         """
         missing = missing_packages(GrowRailPoints.NEEDS)
         if missing:
-            raise RailExtractError(explain_missing(tr("Grow Rails"), missing, []))
+            raise RailExtractError(explain_missing("Grow Rails", missing, []))
         active, layers = self._active_layer(), QgsProject.instance().mapLayers().values()
         clouds = [one for one in layers if isinstance(one, QgsPointCloudLayer)]
         if len(clouds) > 1 and active not in clouds:
-            raise RailExtractError(tr("Select a point cloud in the layer panel, then click on a rail."))
+            raise RailExtractError("Select a point cloud in the layer panel, then click on a rail.")
         if clouds:
             chosen = active if active in clouds else clouds[0]
         else:
             chosen = self._cloud if isinstance(self._cloud, str) else self._ask_for_file()
         if self.seeds and chosen != self._cloud:
             raise RailExtractError(
-                tr("Rails of another point cloud are still shown: classify or undo them before you click on this one.")
+                "Rails of another point cloud are still shown: classify or undo them before you click on this one."
             )
         return chosen
 
     def _ask_for_file(self) -> str | None:
         """Let the user choose the file of a cloud that this QGIS does not show."""
-        title = tr("Select the point cloud in which rails grow")
+        title = "Select the point cloud in which rails grow"
         path, _ = QFileDialog.getOpenFileName(self.parent(), title, "", file_filter())
         return path or None
 
@@ -297,7 +296,7 @@ class GrowRails(QObject):
         """Return a layer of the project with the seeds: that of a dialog that has not run with it, or a new one."""
         layer = QgsProject.instance().mapLayer(self._seed_layer_id)
         if layer is None:
-            layer = QgsProject.instance().addMapLayer(QgsVectorLayer("Point", tr("Rail seeds"), "memory"))
+            layer = QgsProject.instance().addMapLayer(QgsVectorLayer("Point", "Rail seeds", "memory"))
             self._seed_layer_id = layer.id()
         layer.setCrs(self.seeds[0].crs)
         features = [QgsFeature() for _ in self.seeds]
@@ -351,7 +350,7 @@ class GrowRails(QObject):
     def _say(self, text: str) -> None:
         """Show a message above the map."""
         self.message = text
-        self._messages.pushMessage(tr("Grow Rails"), escape(text), Qgis.MessageLevel.Info, MESSAGE_S)
+        self._messages.pushMessage("Grow Rails", escape(text), Qgis.MessageLevel.Info, MESSAGE_S)
 
     def _enable(self) -> None:
         """Enable what can be done."""

@@ -27,7 +27,6 @@ from qgis.PyQt.QtWidgets import (
 )
 
 from ..dialog.wheel import ignore_wheel
-from ..i18n import tr
 from .findings import ACCEPTED, OPEN, REJECTED, Review, decide, findings_layers, reviews
 from .section_view import SectionView
 from .sections import ReadingTask, Sections
@@ -51,7 +50,7 @@ class ReviewDock(QDockWidget):
     """
 
     def __init__(self, iface) -> None:
-        super().__init__(tr("Rail Extract review"), iface.mainWindow())
+        super().__init__("Rail Extract review", iface.mainWindow())
         self.setObjectName("RailExtractReview")
         self._canvas = iface.mapCanvas()
         self._layer: QgsVectorLayer | None = None
@@ -80,10 +79,10 @@ class ReviewDock(QDockWidget):
         self.reason.setStyleSheet("font-weight: 600")
         self.problem.setStyleSheet("color: #d62839")
         shown = {
-            "previous": (tr("Previous"), tr("Show the finding before.")),
-            "next": (tr("Next"), tr("Show the next finding.")),
-            ACCEPTED: (tr("Accept"), tr("The lines are right here. Press again to take the decision back.")),
-            REJECTED: (tr("Reject"), tr("The lines are wrong here. Press again to take the decision back.")),
+            "previous": ("Previous", "Show the finding before."),
+            "next": ("Next", "Show the next finding."),
+            ACCEPTED: ("Accept", "The lines are right here. Press again to take the decision back."),
+            REJECTED: ("Reject", "The lines are wrong here. Press again to take the decision back."),
         }
         self.buttons = {name: QPushButton(label) for name, (label, _) in shown.items()}
         for name, (_, tip) in shown.items():
@@ -92,7 +91,7 @@ class ReviewDock(QDockWidget):
             self.buttons[name].setCheckable(True)
         for name, key in KEYS.items():
             button, context = self.buttons[name], Qt.ShortcutContext.WidgetWithChildrenShortcut
-            button.setToolTip(tr("{} Key: {}").format(button.toolTip(), key))
+            button.setToolTip(f"{button.toolTip()} Key: {key}")
             QShortcut(QKeySequence(key), self, button.click, context=context)
         content, column, grid = QWidget(), QVBoxLayout(), QGridLayout()
         content.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
@@ -242,22 +241,22 @@ class ReviewDock(QDockWidget):
         self.buttons["previous"].setEnabled(self._at > 0)
         self.buttons["next"].setEnabled(self._at < len(self._found) - 1)
         if not any_found or self._sections is None:
-            self.count.setText(tr("There are no findings.") if self._layer else tr("No layer of findings is loaded."))
+            self.count.setText("There are no findings." if self._layer else "No layer of findings is loaded.")
             for label in (self.reason, self.text, self.note):
                 _say(label, "")
             self.view.show_picture(None)
             return
         shown = self._found[self._at]
         decided = sum(one.decision != OPEN for one in self._found)
-        self.count.setText(tr("{} of {}; {} reviewed").format(self._at + 1, len(self._found), decided))
+        self.count.setText(f"{self._at + 1} of {len(self._found)}; {decided} reviewed")
         reason = shown.value("reason") or ""
         _say(self.reason, f"{reason[:1].upper()}{reason[1:]}")
         _say(self.text, " ".join((f"{shown.where}: {shown.figures}.", *self._missing(shown), *_section(shown))))
         picture = self._sections.picture(shown)
         self.view.show_picture(picture)
         nothing = picture.points is None or not len(picture.points)
-        empty = tr("There is no rail point here.") if nothing else ""
-        _say(self.note, tr("Reading the points…") if self.is_reading else picture.note or empty)
+        empty = "There is no rail point here." if nothing else ""
+        _say(self.note, "Reading the points…" if self.is_reading else picture.note or empty)
 
     def _missing(self, shown: Review) -> list[str]:
         """Say which rail has no points, and from where to where."""

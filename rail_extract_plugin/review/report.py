@@ -7,7 +7,6 @@ from qgis.PyQt.QtCore import QObject, QUrl
 from qgis.PyQt.QtGui import QDesktopServices
 from qgis.PyQt.QtWidgets import QApplication
 
-from ..i18n import tr
 from ..notices import notices
 from ..setup.package_setting import GROUP
 
@@ -23,7 +22,7 @@ class ReportOpener(QObject):
 
     def register(self) -> None:
         """Show the setting and wait for reports."""
-        description = tr("Open the report after a run in a dialog")
+        description = "Open the report after a run in a dialog"
         ProcessingConfig.addSetting(Setting(GROUP, OPEN_REPORT, description, True))
         ProcessingConfig.readSettings()
         notices.report_written.connect(self.open)

@@ -10,7 +10,6 @@ from qgis.PyQt.QtCore import QPointF, QRectF, QSize, Qt
 from qgis.PyQt.QtGui import QColor, QPainter, QPaintEvent, QPen, QTextOption
 from qgis.PyQt.QtWidgets import QSizePolicy, QWidget
 
-from ..i18n import tr
 from .sections import REACH_M, Picture
 
 POINT, RAIL, FRAME, PAPER, SOFT = (QColor(name) for name in ("#1565c0", "#d62839", "#dfe5ec", "#ffffff", "#5d6b7a"))
@@ -100,12 +99,12 @@ class SectionView(QWidget):
     def _panels(self, picture: Picture) -> Iterator[Panel]:
         """Yield the whole section, and the nearest rail on either side; only one where none is on the other side."""
         whole, one, other = _boxes(float(self.width()), float(self.height()))
-        yield Panel(whole, 0.0, 0.0, 2 * REACH_M, WHOLE_HEIGHT_M, tr("left") + " – " + tr("right"))
+        yield Panel(whole, 0.0, 0.0, 2 * REACH_M, WHOLE_HEIGHT_M, "left" + " – " + "right")
         is_left = picture.rails[:, 0] < 0
         least = HEADS * picture.head_width_m, HEADS_HIGH * picture.head_width_m
-        heads = [(one, tr("left rail"), is_left), (other, tr("right rail"), ~is_left)]
+        heads = [(one, "left rail", is_left), (other, "right rail", ~is_left)]
         if is_left.all() or not is_left.any():
-            heads = [(one.united(other), tr("rail"), np.ones_like(is_left))] if len(is_left) else []
+            heads = [(one.united(other), "rail", np.ones_like(is_left))] if len(is_left) else []
         for box, title, side in heads:
             mine = picture.rails[side]
             right, up = mine[np.argmin(np.abs(mine[:, 0]))]

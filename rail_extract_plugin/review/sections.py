@@ -13,7 +13,6 @@ from qgis.core import QgsProject, QgsTask, QgsVectorLayer
 from ...core.errors import Cancelled, RailExtractError
 from ...core.polyline import interpolate, length_along, resample
 from ..feedback import TaskProgress
-from ..i18n import tr
 from ..reading.line_layers import gaps_of
 from ..writing.layers import vertices_of
 from ..writing.run import RUN, RunCloud, cloud_of
@@ -121,7 +120,7 @@ class Sections:
             places, _ = _crossings(rail, plane)
             if not len(places):
                 continue
-            side = tr("Right") if places[0, 0] > 0 else tr("Left")
+            side = "Right" if places[0, 0] > 0 else "Left"
             for gap in rail.gaps:
                 ends = interpolate(rail.xyz[:, :2], length_along(rail.xyz[:, :2]), gap)
                 first, last = sorted(along[np.argmin(np.hypot(*(stations[:, :2] - end).T))] for end in ends)

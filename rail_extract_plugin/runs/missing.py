@@ -7,12 +7,8 @@ from html import escape
 
 from qgis.PyQt.QtWidgets import QApplication, QWidget
 
-from ..i18n import tr
 from ..links import links
-from ..setup.dependencies import OPTIONAL, Package
-
-INSTALL = "installpackages"
-"""Name of the algorithm."""
+from ..setup.dependencies import INSTALL, OPTIONAL, Package
 
 _kept: list[QWidget] = []
 """The dialog, which Python would remove otherwise."""
@@ -21,7 +17,7 @@ _kept: list[QWidget] = []
 def with_link(reason: str, packages: Sequence[Package]) -> str:
     """Return a message in HTML with a link that opens Install Packages, set to what is missing."""
     with_torch = any(package.module in OPTIONAL for package in packages)
-    text = tr("Install packages, with PyTorch for the processor") if with_torch else tr("Install packages")
+    text = "Install packages, with PyTorch for the processor" if with_torch else "Install packages"
     return f"<p>{escape(reason)}</p><p>{links.to(text, lambda: open_installation(with_torch))}</p>"
 
 

@@ -14,10 +14,9 @@ from qgis.PyQt.QtWidgets import QFileDialog
 
 from ...core.errors import RailExtractError, UnclassifiedError
 from ...core.standards import STANDARDS
-from ..i18n import tr
 from ..notices import notices
+from ..setup.dependencies import INSTALL
 from ..writing.bundle import save_all
-from .missing import INSTALL
 
 if TYPE_CHECKING:
     from .run_dialog import RunDialog
@@ -43,7 +42,7 @@ def after_failure(dialog: RunDialog, failure: type | None, standard: str) -> Ite
         Name of a rail standard that fits the points better; empty if there is none.
     """
     if failure is UnclassifiedError and "CLASSIFY" in dialog.mainWidget().wrappers:
-        yield Step(tr("Find the rail points of this raw cloud, and run again"), _again(dialog, CLASSIFY=True))
+        yield Step("Find the rail points of this raw cloud, and run again", _again(dialog, CLASSIFY=True))
     yield from _with_other_standard(dialog, standard)
 
 
@@ -53,22 +52,22 @@ def after_success(
     """Yield what to do with the results of a run; see `after_failure`."""
     algorithm = dialog.algorithm()
     if algorithm.name() == INSTALL and algorithm.provider().algorithm("extractrails").canExecute()[0]:
-        yield Step(tr("Open the sample…"), notices.sample_wanted.emit)
+        yield Step("Open the sample…", notices.sample_wanted.emit)
     layers = _layers([one.name() for one in algorithm.destinationParameterDefinitions()], results, context)
     if "FINDINGS" in layers and layers["FINDINGS"].featureCount():
         findings = layers["FINDINGS"].id()
-        yield Step(tr("Review the findings"), lambda: notices.findings_loaded.emit(findings))
+        yield Step("Review the findings", lambda: notices.findings_loaded.emit(findings))
     if results.get("REPORT"):
-        yield Step(tr("Open the report"), lambda: QDesktopServices.openUrl(QUrl.fromLocalFile(results["REPORT"])))
+        yield Step("Open the report", lambda: QDesktopServices.openUrl(QUrl.fromLocalFile(results["REPORT"])))
     if layers:
-        yield Step(tr("Save all layers with styles and a project in one GeoPackage…"), lambda: _save(dialog, layers))
+        yield Step("Save all layers with styles and a project in one GeoPackage…", lambda: _save(dialog, layers))
     yield from _with_other_standard(dialog, standard)
 
 
 def _with_other_standard(dialog: RunDialog, standard: str) -> Iterator[Step]:
     if standard in STANDARDS and "STANDARD" in dialog.mainWidget().wrappers:
         changes = {"STANDARD": standard, "GAUGE": None, "HEAD_WIDTH": None}
-        yield Step(tr("Run again as {}").format(STANDARDS[standard].label), _again(dialog, **changes))
+        yield Step(f"Run again as {STANDARDS[standard].label}", _again(dialog, **changes))
 
 
 def _again(dialog: RunDialog, **changes: Any) -> Callable[[], None]:
@@ -85,8 +84,8 @@ def _layers(names: Sequence[str], results: dict[str, Any], context: QgsProcessin
 
 def _save(dialog: RunDialog, layers: dict[str, QgsVectorLayer]) -> None:
     """Ask for a file, and save the layers there."""
-    kind = tr("GeoPackages (*.gpkg)")
-    chosen, _ = QFileDialog.getSaveFileName(dialog, tr("Save all layers of the run"), "", kind)
+    kind = "GeoPackages (*.gpkg)"
+    chosen, _ = QFileDialog.getSaveFileName(dialog, "Save all layers of the run", "", kind)
     if not chosen:
         return
     path = Path(chosen).with_suffix(".gpkg")
@@ -95,4 +94,4 @@ def _save(dialog: RunDialog, layers: dict[str, QgsVectorLayer]) -> None:
     except RailExtractError as error:
         dialog.messageBar().pushMessage("", str(error), Qgis.MessageLevel.Critical, 0)
         return
-    dialog.messageBar().pushMessage("", tr("Saved {}.").format(path), Qgis.MessageLevel.Success, 0)
+    dialog.messageBar().pushMessage("", f"Saved {path}.", Qgis.MessageLevel.Success, 0)

@@ -34,7 +34,6 @@ from ..dialog.help_panel import ADVANCED
 from ..dialog.sections import OTHERS, RESULTS, SECTIONS, section_of
 from ..dialog.wheel import ignore_wheel
 from ..dialog.wording import with_labels
-from ..i18n import tr
 from ..links import LinkFollower, links
 from ..notices import notices
 from .help_pictures import PictureFitter
@@ -104,7 +103,7 @@ class RunDialog(AlgorithmDialog):
                 self._offer(step)
         if steps:
             offered = " &nbsp;·&nbsp; ".join(links.to(step.text, self._step(step)) for step in steps)
-            self.setInfo(f"<b>{tr('Next:')}</b> {offered}", escapeHtml=False)
+            self.setInfo(f"<b>{'Next:'}</b> {offered}", escapeHtml=False)
         self._failure, self._standard = None, ""
 
     def _offer(self, step: Step) -> None:

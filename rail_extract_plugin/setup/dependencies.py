@@ -33,6 +33,9 @@ OWNED_BY_QGIS = ("numpy", "scipy")
 OPTIONAL = ("torch",)
 """Modules that another one can replace."""
 
+INSTALL = "installpackages"
+"""Name of the algorithm that installs packages."""
+
 
 def missing_packages(needs: tuple[tuple[str, ...], ...]) -> tuple[Package, ...]:
     """Find out which packages are missing, without importing modules.
@@ -78,7 +81,7 @@ def explain_missing(label: str, packages: Sequence[Package], usable: Sequence[st
     choice, option = (", with PyTorch set to CPU,", " -- TORCH=CPU") if with_torch else ("", "")
     return (
         f"{label} needs the {nouns} {names}, which this QGIS does not have: run Install packages{choice} in the "
-        f"toolbox under Rail Extract, or qgis_process run railextract:installpackages{option} in a shell.{others}"
+        f"toolbox under Rail Extract, or qgis_process run railextract:{INSTALL}{option} in a shell.{others}"
     )
 
 

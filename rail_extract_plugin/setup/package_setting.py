@@ -5,7 +5,6 @@ from __future__ import annotations
 from processing.core.ProcessingConfig import ProcessingConfig, Setting
 from qgis.PyQt.QtGui import QIcon
 
-from ..i18n import tr
 from ..paths import ICON
 from .package_folders import VARIABLE
 
@@ -15,7 +14,7 @@ GROUP = "Rail Extract"
 def register() -> None:
     """Show the setting; a change takes effect after a restart of QGIS."""
     ProcessingConfig.settingIcons[GROUP] = QIcon(str(ICON))
-    description = tr("Additional folder of Python packages (takes effect after a restart)")
+    description = "Additional folder of Python packages (takes effect after a restart)"
     ProcessingConfig.addSetting(Setting(GROUP, VARIABLE, description, "", valuetype=Setting.FOLDER))
     ProcessingConfig.readSettings()
 

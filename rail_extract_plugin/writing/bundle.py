@@ -9,7 +9,6 @@ from qgis.core import QgsMapLayerStyle, QgsProject, QgsVectorFileWriter, QgsVect
 
 from ...core.disk import Destination
 from ...core.errors import RailExtractError
-from ..i18n import tr
 
 PROJECT = "Rail Extract"
 """Name of the project in the file, and of the group of its layers."""
@@ -37,9 +36,7 @@ def save_all(layers: Sequence[QgsVectorLayer], path: Path) -> None:
         written = project.write(f"geopackage:{new}?projectName={PROJECT}")
         project.clear()  # closes the file
         if not written:
-            raise RailExtractError(
-                tr("The project can't be written to {}: check the free disk space.").format(path.name)
-            )
+            raise RailExtractError(f"The project can't be written to {path.name}: check the free disk space.")
 
 
 def _table(layer: QgsVectorLayer) -> str:
@@ -56,7 +53,7 @@ def _saved(layer: QgsVectorLayer, table: str, path: Path, is_first: bool) -> Qgs
     context = QgsProject.instance().transformContext()
     code, message, *_ = QgsVectorFileWriter.writeAsVectorFormatV3(layer, str(path), context, options)
     if code != QgsVectorFileWriter.WriterError.NoError:
-        raise RailExtractError(tr("{} can't be written ({}): choose another folder.").format(path.name, message))
+        raise RailExtractError(f"{path.name} can't be written ({message}): choose another folder.")
     saved = QgsVectorLayer(f"{path}|layername={table}", layer.name(), "ogr")
     style = QgsMapLayerStyle()
     style.readFromLayer(layer)

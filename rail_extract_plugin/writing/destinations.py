@@ -13,7 +13,6 @@ from qgis.core import (
     QgsProcessing,
     QgsProcessingContext,
     QgsProcessingOutputLayerDefinition,
-    QgsProperty,
     QgsProviderRegistry,
     QgsVectorDataProvider,
     QgsVectorLayer,
@@ -21,6 +20,7 @@ from qgis.core import (
 
 from ...core.disk import Destination
 from ...core.errors import RailExtractError
+from ..dialog.parameter_values import destination_text
 from ..systems import prepare_system
 from .databases import POSTGIS, check_database
 
@@ -67,7 +67,7 @@ def destinations(values: Mapping[str, Any], context: QgsProcessingContext) -> di
     files: dict[Path, Destination] = {}
     found: dict[str, Destination] = {}
     for name, value in values.items():
-        check_database(name, _text(value, context))
+        check_database(name, destination_text(value, context))
         path = output_file(value, context)
         if path is not None:
             if appends(value):
@@ -97,7 +97,7 @@ def check_layer_name(name: str, value: Any, context: QgsProcessingContext) -> No
     RailExtractError
         QGIS reads what comes before a colon as the name of a data provider, and no provider has this name.
     """
-    text = _text(value, context)
+    text = destination_text(value, context)
     file, found = output_file(value, context), PROVIDER.fullmatch(text)
     if file is not None and file.suffix.lower() in EXCHANGED:
         return  # not written by QGIS
@@ -148,20 +148,6 @@ def _check_distinct(outputs: Mapping[str, tuple[Path, str]]) -> None:
         seen.append((name, file, table))
 
 
-def is_wanted(value: Any, context: QgsProcessingContext) -> bool:
-    """Return whether a destination names anything; the batch dialog gives an empty definition for a skipped output."""
-    return bool(_text(value, context))
-
-
-def _text(value: Any, context: QgsProcessingContext) -> str:
-    """Return a destination as a user writes it; empty if there is none."""
-    if isinstance(value, QgsProcessingOutputLayerDefinition):
-        value = value.sink
-    if isinstance(value, QgsProperty):
-        value = value.valueAsString(context.expressionContext())[0]
-    return value or ""
-
-
 def appends(value: Any) -> bool:
     """Return whether features are to be added to an existing layer."""
     return isinstance(value, QgsProcessingOutputLayerDefinition) and value.useRemapping()
@@ -181,7 +167,7 @@ def table_of(value: Any, context: QgsProcessingContext) -> str:
 
 def _file_and_table(value: Any, context: QgsProcessingContext) -> tuple[str, str]:
     """Return path and table of a destination; an existing layer is named as in QGIS's layer properties."""
-    text = _text(value, context)
+    text = destination_text(value, context)
     if text.startswith(TABLE):
         return _uri(text).database(), _uri(text).table()
     if appends(value):

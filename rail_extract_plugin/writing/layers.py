@@ -18,7 +18,6 @@ from qgis.core import (
     QgsGeometry,
     QgsLineString,
     QgsPoint,
-    QgsProcessingAlgorithm,
     QgsProcessingContext,
     QgsProcessingOutputLayerDefinition,
     QgsVertexIterator,
@@ -30,8 +29,9 @@ from ...core.errors import RailExtractError
 from ...core.fields import BRIDGED, LENGTH, PLACES, SIGMA, UNKNOWN_IN_METRES, Field, Product
 from ...core.progress import SILENT, Progress
 from ..compat import INTEGER, REAL, TEXT, field
+from ..dialog.parameter_values import ParameterValues
 from ..systems import lost_part, system
-from .destinations import EXCHANGED, is_wanted
+from .destinations import EXCHANGED
 from .styling import style_on_load
 from .whole_files import write_whole
 
@@ -121,26 +121,17 @@ def add_features(sink: QgsFeatureSink, made: Iterator[QgsFeature]) -> int:
     return count
 
 
-def write_layer(
-    algorithm: QgsProcessingAlgorithm,
-    name: str,
-    layer: Layer,
-    frame: LocalFrame,
-    parameters: dict[str, Any],
-    context: QgsProcessingContext,
-) -> dict[str, str]:
+def write_layer(values: ParameterValues, name: str, layer: Layer, frame: LocalFrame) -> dict[str, str]:
     """Write a layer to an output.
 
     Parameters
     ----------
-    algorithm : QgsProcessingAlgorithm
+    values : ParameterValues
     name : str
         Name of the output.
     layer : Layer
     frame : LocalFrame
         Local frame of the layer.
-    parameters : dict
-    context : QgsProcessingContext
 
     Returns
     -------
@@ -152,61 +143,47 @@ def write_layer(
     RailExtractError
         The output cannot be written.
     """
-    if not is_wanted(parameters.get(name), context):
+    if not values.wanted(name):
         return {}
     shape, made, product = _shape_of(layer), features(layer, frame), layer.product
-    destination = algorithm.destinations.get(name)
+    destination = values.algorithm.destinations.get(name)
     if destination is not None and destination.file.suffix.lower() in EXCHANGED:
-        return _exchange(algorithm, name, product, shape, made, frame, parameters, context)
+        return _exchange(values, name, product, shape, made, frame)
     # QGIS complains of the system that stands for an unknown one as soon as a layer is in the project.
-    is_shown = destination is None and bool(getattr(parameters.get(name), "destinationProject", None))
+    is_shown = destination is None and bool(getattr(values.parameters.get(name), "destinationProject", None))
     columns, crs = fields(product.fields), system(frame.crs_wkt) if is_shown else output_crs(frame.crs_wkt)
-    layer_id = _layer(algorithm, name, columns, shape, made, crs, lost_part(frame.crs_wkt), parameters, context)
-    if not layer_id:
-        return {}
-    _style(algorithm, name, layer_id, product.style, context, has_system=frame.crs_wkt is not None)
-    return {name: layer_id}
+    return _layer(values, name, product.style, columns, shape, made, crs, frame.crs_wkt)
 
 
 def layer_writers(
-    algorithm: QgsProcessingAlgorithm,
-    makers: Mapping[str, Callable[[], Layer]],
-    frame: LocalFrame,
-    parameters: dict[str, Any],
-    context: QgsProcessingContext,
+    values: ParameterValues, makers: Mapping[str, Callable[[], Layer]], frame: LocalFrame
 ) -> dict[str, Callable[[], dict[str, str]]]:
     """Return the functions that make layers and write them to the outputs of their names, for `write_each`.
 
     Parameters
     ----------
     makers : mapping of str to callable
-    algorithm, frame, parameters, context
+    values, frame
         See `write_layer`.
     """
 
     def write(name: str) -> dict[str, str]:
-        return write_layer(algorithm, name, makers[name](), frame, parameters, context)
+        return write_layer(values, name, makers[name](), frame)
 
-    return {name: partial(write, name) for name in makers if is_wanted(parameters.get(name), context)}
+    return {name: partial(write, name) for name in makers if values.wanted(name)}
 
 
 def write_raster(
-    algorithm: QgsProcessingAlgorithm,
-    name: str,
-    header: RasterHeader,
-    rasters: Sequence[RailRaster],
-    parameters: dict[str, Any],
-    context: QgsProcessingContext,
-    progress: Progress = SILENT,
+    values: ParameterValues, name: str, header: RasterHeader, rasters: Sequence[RailRaster], progress: Progress = SILENT
 ) -> dict[str, str]:
     """Write rail rasters, one per class, to an output.
 
     Parameters
     ----------
+    values, name
+        See `write_layer`.
     header : RasterHeader
     rasters : sequence of RailRaster
-    algorithm, name, parameters, context
-        See `write_layer`.
     progress : Progress
 
     Returns
@@ -216,13 +193,13 @@ def write_raster(
     """
     from ..reading.geotiff import write_rasters
 
-    if not is_wanted(parameters.get(name), context):
+    if not values.wanted(name):
         return {}
-    path = algorithm.parameterAsOutputLayer(parameters, name, context)
-    destination = algorithm.destinations.get(name) or Destination.at(Path(path))
+    path = values.algorithm.parameterAsOutputLayer(values.parameters, name, values.context)
+    destination = values.algorithm.destinations.get(name) or Destination.at(Path(path))
     with destination.replacing() as new:
         write_rasters(new, header, rasters, progress)
-    _style(algorithm, name, path, "raster", context)
+    _style(values, name, path, "raster")
     return {name: path}
 
 
@@ -255,81 +232,76 @@ def output_crs(wkt: str | None) -> QgsCoordinateReferenceSystem:
 
 
 def write_copy(
-    algorithm: QgsProcessingAlgorithm,
+    values: ParameterValues,
     name: str,
     columns: QgsFields,
     shape: QgsWkbTypes.Type,
     made: Iterator[QgsFeature],
     crs: QgsCoordinateReferenceSystem,
-    parameters: dict[str, Any],
-    context: QgsProcessingContext,
 ) -> dict[str, str]:
     """Write a copy of a layer of any kind, with other fields.
 
     Parameters
     ----------
+    values, name
+        See `write_layer`.
     columns : QgsFields
     shape : QgsWkbTypes.Type
     made : iterator of QgsFeature
     crs : QgsCoordinateReferenceSystem
-    algorithm, name, parameters, context
-        See `write_layer`.
     """
-    destination, wkt = algorithm.destinations.get(name), crs.toWkt() if crs.isValid() else None
-    if destination is not None and destination.file.suffix.lower() in EXCHANGED:
-        import numpy as np
+    destination, wkt = values.algorithm.destinations.get(name), crs.toWkt() if crs.isValid() else None
+    if destination is None or destination.file.suffix.lower() not in EXCHANGED:
+        return _layer(values, name, PLACES.style, columns, shape, made, crs, wkt)
+    import numpy as np
 
-        from ...core.clouds.crs import parse_crs, units
-        from ...core.frame import LocalFrame
+    from ...core.clouds.crs import parse_crs, units
+    from ...core.frame import LocalFrame
 
-        if QgsWkbTypes.geometryType(shape) == QgsWkbTypes.GeometryType.PolygonGeometry:
-            raise RailExtractError(f"{name} can't be {destination.path.name} for polygons: choose a GeoPackage.")
-        written = tuple(Field(one.name(), float if one.isNumeric() else str, "") for one in columns)
-        unit_m = units(parse_crs(wkt))[0] if wkt and not crs.isGeographic() else 1.0
-        frame = LocalFrame(np.zeros(3), unit_m, crs_wkt=wkt)
-        product = replace(PLACES, fields=written)
-        return _exchange(algorithm, name, product, shape, made, frame, parameters, context)
-    layer_id = _layer(algorithm, name, columns, shape, made, crs, lost_part(wkt), parameters, context)
-    if not layer_id:
-        return {}
-    _style(algorithm, name, layer_id, PLACES.style, context)
-    return {name: layer_id}
+    if QgsWkbTypes.geometryType(shape) == QgsWkbTypes.GeometryType.PolygonGeometry:
+        raise RailExtractError(f"{name} can't be {destination.path.name} for polygons: choose a GeoPackage.")
+    written = tuple(Field(one.name(), float if one.isNumeric() else str, "") for one in columns)
+    unit_m = units(parse_crs(wkt))[0] if wkt and not crs.isGeographic() else 1.0
+    frame = LocalFrame(np.zeros(3), unit_m, crs_wkt=wkt)
+    return _exchange(values, name, replace(PLACES, fields=written), shape, made, frame)
 
 
 def _layer(
-    algorithm: QgsProcessingAlgorithm,
+    values: ParameterValues,
     name: str,
+    style: str,
     columns: QgsFields,
     shape: QgsWkbTypes.Type,
     made: Iterator[QgsFeature],
     crs: QgsCoordinateReferenceSystem,
-    lost: str | None,
-    parameters: dict[str, Any],
-    context: QgsProcessingContext,
-) -> str:
-    """Write features to a layer, and return its id; empty if the user skipped it."""
+    wkt: str | None,
+) -> dict[str, str]:
+    """Write features to a layer with a style; `wkt` is the system that is known of the cloud."""
+    algorithm, parameters, context = values.algorithm, values.parameters, values.context
 
     def write(value: Any) -> tuple[str, int]:
         sink, layer_id = algorithm.parameterAsSink({**parameters, name: value}, name, context, columns, shape, crs)
         return (layer_id, add_features(sink, made)) if sink else ("", 0)
 
-    return write_whole(parameters.get(name), context, algorithm.destinations.get(name), write, lost)
+    layer_id = write_whole(parameters.get(name), context, algorithm.destinations.get(name), write, lost_part(wkt))
+    if not layer_id:
+        return {}
+    _style(values, name, layer_id, style, has_system=wkt is not None)
+    return {name: layer_id}
 
 
 def _exchange(
-    algorithm: QgsProcessingAlgorithm,
+    values: ParameterValues,
     name: str,
     product: Product,
     shape: QgsWkbTypes.Type,
     made: Iterator[QgsFeature],
     frame: LocalFrame,
-    parameters: dict[str, Any],
-    context: QgsProcessingContext,
 ) -> dict[str, str]:
     """Write features for other programs; QGIS loads the file if the user wants that."""
     from ...core.output.exchange import Shape, write_shapes
 
-    destination, value = algorithm.destinations[name], parameters.get(name)
+    destination, value = values.algorithm.destinations[name], values.parameters.get(name)
     shapes = (
         Shape(_vertices(part.vertices()), _plain(feature.attributes()))
         for feature in made
@@ -340,9 +312,9 @@ def _exchange(
         write_shapes(new, shapes, product.fields, frame, product.drawn, is_line)
     path = str(destination.path)
     if isinstance(value, QgsProcessingOutputLayerDefinition) and value.destinationProject:
-        title = algorithm.parameterDefinition(name).description()
+        title = values.algorithm.parameterDefinition(name).description()
         details = QgsProcessingContext.LayerDetails(title, value.destinationProject, name)
-        context.addLayerToLoadOnCompletion(path, details)
+        values.context.addLayerToLoadOnCompletion(path, details)
     return {name: path}
 
 
@@ -362,14 +334,8 @@ def _plain(values: Sequence[Any]) -> list[Any]:
     return [None if value == NULL else value.toString() if hasattr(value, "toString") else value for value in values]
 
 
-def _style(
-    algorithm: QgsProcessingAlgorithm,
-    name: str,
-    layer_id: str,
-    style: str,
-    context: QgsProcessingContext,
-    has_system: bool = True,
-) -> None:
+def _style(values: ParameterValues, name: str, layer_id: str, style: str, has_system: bool = True) -> None:
     """Apply a style to an output when QGIS loads it, and name it by the cloud of the run."""
+    algorithm = values.algorithm
     title = algorithm.parameterDefinition(name).description()
-    style_on_load(layer_id, style, context, algorithm.layer_properties, title, has_system)
+    style_on_load(layer_id, style, values.context, algorithm.layer_properties, title, has_system)

@@ -5,40 +5,32 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
-
-from qgis.core import QgsProcessingAlgorithm, QgsProcessingContext
+from typing import TYPE_CHECKING
 
 from ...core.disk import Destination
+from ..dialog.parameter_values import ParameterValues
 from ..notices import notices
 
 if TYPE_CHECKING:
     from ...core.alignment.deviations import Deviations
     from ...core.alignment.elements import Alignment
-    from ...core.comparison.tracks import TrackComparison
     from ...core.rails import RailNetwork
     from ...core.report import Origin
 
 
-def write_report(
-    algorithm: QgsProcessingAlgorithm,
-    name: str,
-    network: RailNetwork,
-    origin: Origin,
-    parameters: dict[str, Any],
-    context: QgsProcessingContext,
-) -> dict[str, str]:
-    """Write the report on a network with its geometry to an output; an existing file stays until it is complete.
+def write_report(values: ParameterValues, network: RailNetwork, origin: Origin) -> dict[str, str]:
+    """Write the report on a network with its geometry; see `write_shown`."""
+    return write_shown(values, lambda: origin.report(network))
+
+
+def write_shown(values: ParameterValues, build: Callable[[], str]) -> dict[str, str]:
+    """Write REPORT if the user wants it, and have QGIS show it; an existing file stays until it is complete.
 
     Parameters
     ----------
-    algorithm : QgsProcessingAlgorithm
-    name : str
-        Name of the output.
-    network : RailNetwork
-    origin : Origin
-    parameters : dict
-    context : QgsProcessingContext
+    values : ParameterValues
+    build : callable
+        Returns the page.
 
     Returns
     -------
@@ -50,47 +42,26 @@ def write_report(
     RailExtractError
         The file cannot be written.
     """
-    return write_shown(algorithm, name, lambda: origin.report(network), parameters, context)
-
-
-def write_shown(
-    algorithm: QgsProcessingAlgorithm,
-    name: str,
-    build: Callable[[], str],
-    parameters: dict[str, Any],
-    context: QgsProcessingContext,
-) -> dict[str, str]:
-    """Write a report that is built only if the user wants it, and have QGIS show it; see `write_report`.
-
-    Parameters
-    ----------
-    build : callable
-        Returns the page.
-    algorithm, name, parameters, context
-        See `write_report`.
-    """
-    path = algorithm.parameterAsFileOutput(parameters, name, context)
+    path = values.output_file("REPORT")
     if not path:
         return {}
-    written = write_page(algorithm, name, path, build())
+    written = write_page(values, "REPORT", path, build())
     notices.report_written.emit(path)
     return written
 
 
 def write_alignment_report(
-    algorithm: QgsProcessingAlgorithm,
-    name: str,
+    values: ParameterValues,
     courses: Sequence[tuple[Alignment, Deviations]],
     source: str,
     facts: Mapping[str, str],
     fitted: bool,
-    parameters: dict[str, Any],
-    context: QgsProcessingContext,
 ) -> dict[str, str]:
-    """Write the report on alignments to an output; see `write_report`.
+    """Write the report on alignments; see `write_shown`.
 
     Parameters
     ----------
+    values : ParameterValues
     courses : sequence of (Alignment, Deviations)
     source : str
         Name of the measured tracks.
@@ -98,78 +69,37 @@ def write_alignment_report(
         Facts to state by name, besides date, version and coordinate system.
     fitted : bool
         Whether the alignments were fitted to the tracks.
-    algorithm, name, parameters, context
-        See `write_report`.
     """
     from ...core.report import build_alignment_page
 
     def build() -> str:
         return build_alignment_page(courses, source, facts, fitted)
 
-    return write_shown(algorithm, name, build, parameters, context)
+    return write_shown(values, build)
 
 
-def write_comparison(
-    algorithm: QgsProcessingAlgorithm,
-    name: str,
-    found: TrackComparison,
-    counts_shift: bool,
-    source: str,
-    facts: Mapping[str, str],
-    parameters: dict[str, Any],
-    context: QgsProcessingContext,
-) -> dict[str, str]:
-    """Write the report on a comparison to an output; see `write_report`.
+def write_check(values: ParameterValues, verdict: str, facts: Mapping[str, str]) -> dict[str, str]:
+    """Write the result of Check Installation, which no run shows by itself.
 
     Parameters
     ----------
-    algorithm : QgsProcessingAlgorithm
-    name : str
-    found : TrackComparison
-    counts_shift, source, facts
-        See `build_comparison`.
-    parameters : dict
-    context : QgsProcessingContext
-    """
-    from ...core.report.comparison import build_comparison
-
-    return write_shown(
-        algorithm, name, lambda: build_comparison(found, counts_shift, source, facts), parameters, context
-    )
-
-
-def write_check(
-    algorithm: QgsProcessingAlgorithm,
-    name: str,
-    verdict: str,
-    facts: Mapping[str, str],
-    parameters: dict[str, Any],
-    context: QgsProcessingContext,
-) -> dict[str, str]:
-    """Write the result of Check Installation to an output; see `write_report`.
-
-    Parameters
-    ----------
-    algorithm : QgsProcessingAlgorithm
-    name : str
+    values : ParameterValues
     verdict : str
         A sentence.
     facts : mapping of str to str
         Findings by name.
-    parameters : dict
-    context : QgsProcessingContext
     """
-    path = algorithm.parameterAsFileOutput(parameters, name, context)
+    path = values.output_file("REPORT")
     if not path:
         return {}
     rows = "".join(f"<tr><th align='left'>{escape(key)}</th><td>{escape(facts[key])}</td></tr>" for key in facts)
-    title = f"<title>{escape(algorithm.displayName())}</title>"
+    title = f"<title>{escape(values.algorithm.displayName())}</title>"
     page = f'<!DOCTYPE html><meta charset="utf-8">{title}<h1>{escape(verdict)}</h1><table>{rows}</table>'
-    return write_page(algorithm, name, path, page)
+    return write_page(values, "REPORT", path, page)
 
 
-def write_page(algorithm: QgsProcessingAlgorithm, name: str, path: str, page: str) -> dict[str, str]:
+def write_page(values: ParameterValues, name: str, path: str, page: str) -> dict[str, str]:
     """Write a page to an output; QGIS chooses the path of a temporary one during the run."""
-    destination = algorithm.destinations.get(name) or Destination.at(Path(path))
+    destination = values.algorithm.destinations.get(name) or Destination.at(Path(path))
     destination.write_text(page)
     return {name: path}

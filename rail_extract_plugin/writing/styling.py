@@ -16,7 +16,6 @@ from qgis.core import (
 from qgis.PyQt import sip
 
 from .. import compat
-from ..i18n import tr
 from ..notices import notices
 from ..paths import STYLES
 from .run import RUN, run_name
@@ -127,4 +126,4 @@ def style_on_load(
         details = context.layerToLoadOnCompletionDetails(layer_id)
         details.setPostProcessor(_styler(style, title, properties, has_system))
         if compat.GROUPS_LAYERS:
-            details.groupName = tr("Rail Extract")
+            details.groupName = "Rail Extract"

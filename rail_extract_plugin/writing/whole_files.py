@@ -18,6 +18,7 @@ from ...core.disk import Destination
 from ...core.errors import RailExtractError
 from ...core.output.geopackage import tables_in
 from ...core.scratch import scratch_folder
+from ..dialog.parameter_values import ParameterValues
 from .destinations import appends, output_file, table_of
 
 Write = Callable[[Any], tuple[str, int]]
@@ -85,17 +86,14 @@ def _write_table(value: Any, destination: Destination, table: str, write: Write,
     return layer_id
 
 
-def write_each(
-    writers: Mapping[str, Callable[[], dict[str, str]]], parameters: dict[str, Any], context: QgsProcessingContext
-) -> dict[str, str]:
+def write_each(writers: Mapping[str, Callable[[], dict[str, str]]], values: ParameterValues) -> dict[str, str]:
     """Write the outputs of a run one after the other; if one fails, the others are still written.
 
     Parameters
     ----------
     writers : mapping of str to callable
         Function that writes an output, by its name; returns the path or id by that name, or nothing if skipped.
-    parameters : dict
-    context : QgsProcessingContext
+    values : ParameterValues
 
     Raises
     ------
@@ -110,7 +108,8 @@ def write_each(
         except (RailExtractError, QgsProcessingException) as error:
             failures[name] = error
     if failures:
-        raise RailExtractError(_explain(failures, [name for name in written if output_file(parameters[name], context)]))
+        whole = [name for name in written if output_file(values.parameters[name], values.context)]
+        raise RailExtractError(_explain(failures, whole))
     return written
 
 

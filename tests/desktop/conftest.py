@@ -14,9 +14,6 @@ from typing import Any
 import laspy
 import numpy as np
 import pytest
-from rail_extract.laboratory.airborne.designs import curved_line, drawn_together
-from rail_extract.laboratory.airborne.flight import Flight, fly
-from rail_extract.laboratory.airborne.write import CRS, ORIGIN, write_airborne
 from rail_extract.laboratory.scenes.raw_strips import strip
 
 HERE = Path(__file__).resolve().parent
@@ -78,22 +75,7 @@ def raw_cloud(tmp_path_factory):
 
 
 @pytest.fixture(scope="session")
-def airborne_cloud(tmp_path_factory):
-    """An airborne cloud of 200 m of two tracks, with a file of guides, `guides.geojson`, next to it."""
-    folder = tmp_path_factory.mktemp("air")
-    design = curved_line(5, 200.0, cant_m=0.1, radius_m=450.0)
-    write_airborne(fly(design.world, design.where, 8.0, Flight(10.0, 0.25, plants=0.03), seed=5), folder / "air.laz")
-    lines = [(guide + ORIGIN[:2]).tolist() for guide in drawn_together(design.tracks, 5, off_m=0.4)]
-    shapes = [{"type": "LineString", "coordinates": line} for line in lines]
-    features = [{"type": "Feature", "properties": {}, "geometry": shape} for shape in shapes]
-    system = {"type": "name", "properties": {"name": CRS}}
-    guides = {"type": "FeatureCollection", "crs": system, "features": features}
-    (folder / "guides.geojson").write_text(json.dumps(guides), encoding="utf-8")
-    return folder / "air.laz"
-
-
-@pytest.fixture(scope="session")
-def run_scenario(tmp_path_factory, raw_cloud, airborne_cloud):
+def run_scenario(tmp_path_factory, raw_cloud):
     """Run a scenario, once: tests share what it found. One that goes on has the profile of another one."""
     programs = {name: shutil.which(name) for name in ("qgis", "xvfb-run")}
     if not all(programs.values()) or "QGIS_PROCESS" not in os.environ:
@@ -113,7 +95,6 @@ def run_scenario(tmp_path_factory, raw_cloud, airborne_cloud):
             "TMPDIR": str(temporary),
             "RAIL_EXTRACT_SAMPLE": str(ROOT / "resources" / "sample" / "sample.laz"),
             "RAIL_EXTRACT_RAW": str(raw_cloud),
-            "RAIL_EXTRACT_AIRBORNE": str(airborne_cloud),
             "RAIL_EXTRACT_ZIP": str(ROOT / "build" / "rail_extract.zip"),
         }
         for name in ("QGIS_PLUGINPATH", "QGIS_CUSTOM_CONFIG_PATH"):

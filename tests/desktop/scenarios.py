@@ -11,11 +11,8 @@ from pathlib import Path
 
 from driver import Driver, algorithm, choose, close, install, later, open_batch, open_dialog, press_run, window
 from qgis.core import (
-    NULL,
     QgsApplication,
     QgsCoordinateReferenceSystem,
-    QgsFeature,
-    QgsGeometry,
     QgsPointCloudLayer,
     QgsPointXY,
     QgsProcessingParameterEnum,
@@ -46,10 +43,7 @@ from qgis.PyQt.QtWidgets import (
 )
 from qgis.utils import iface, loadPlugin, plugins, reloadPlugin, startPlugin, unloadPlugin
 
-RAW, AIRBORNE = os.environ["RAIL_EXTRACT_RAW"], os.environ["RAIL_EXTRACT_AIRBORNE"]
-SAMPLE, ARCHIVE = os.environ["RAIL_EXTRACT_SAMPLE"], os.environ["RAIL_EXTRACT_ZIP"]
-TRUTH = Path(SAMPLE).with_name("sample_truth.geojson")
-
+RAW, SAMPLE, ARCHIVE = (os.environ[f"RAIL_EXTRACT_{name}"] for name in ("RAW", "SAMPLE", "ZIP"))
 NAMES = (
     *("extractrails", "classifyrailpoints", "growrailpoints", "airbornecenterlines"),
     *("rasterizerailpoints", "frpdfcleanup", "vectorizerails"),
@@ -434,59 +428,6 @@ def _follow(log: QTextEdit, text: str) -> None:
     QTest.mouseClick(log.viewport(), Qt.MouseButton.LeftButton, pos=log.cursorRect(found).center())
 
 
-def elements(driver: Driver) -> Iterator:
-    """Draw tracks from the air along guides, fit their elements, and take these to a design file and back."""
-    yield from install(ARCHIVE)
-    folder = driver.folder
-    dialog = yield from open_dialog("airbornecenterlines")
-    lines = str(folder / "from the air.gpkg")
-    guides = str(Path(AIRBORNE).with_name("guides.geojson"))
-    others = {"STATIONS": "TEMPORARY_OUTPUT", "FINDINGS": "TEMPORARY_OUTPUT", "REPORT": str(folder / "air.html")}
-    dialog.setParameters({"INPUT": AIRBORNE, "GUIDE": guides, "FOOTPRINT": 0.25, "CENTERLINES": lines, **others})
-    driver.picture("air_dialog")
-    driver.keep("air log", (yield from press_run(dialog)))
-    driver.picture("air_log")
-    driver.keep("air", dialog.results())
-    yield from close(dialog)
-    yield 1.0
-    driver.keep("air order", [node.name() for node in QgsProject.instance().layerTreeRoot().findLayers()])
-    driver.picture("air_map")
-    dialog = yield from open_dialog("fitalignment")
-    table = str(folder / "elements.gpkg")
-    dialog.setParameters({"INPUT": lines, "TOLERANCE": 30, "ELEMENTS": table, "DEVIATIONS": "TEMPORARY_OUTPUT"})
-    driver.picture("fit_dialog")
-    driver.keep("fit log", (yield from press_run(dialog)))
-    driver.picture("fit_log")
-    yield from close(dialog)
-    yield 1.0
-    driver.picture("fit_map")
-    saved = QgsVectorLayer(table, "elements", "ogr")
-    rows = [(one["track_id"], one["layout"], one["type"], one["r1_m"]) for one in saved.getFeatures()]
-    driver.keep("elements", [[str(value) for value in row] for row in rows])
-    yield from _exchange(driver, table)
-
-
-def _exchange(driver: Driver, table: str) -> Iterator:
-    """Write an element table as LandXML, and read it back as elements and axes."""
-    folder = driver.folder
-    dialog = yield from open_dialog("exportalignment")
-    design = str(folder / "design.xml")
-    dialog.setParameters({"INPUT": table, "OUTPUT": design})
-    driver.picture("export_dialog")
-    driver.keep("export log", (yield from press_run(dialog)))
-    driver.keep("exported", dialog.results()["ALIGNMENT_COUNT"])
-    yield from close(dialog)
-    dialog = yield from open_dialog("importalignment")
-    axes = str(folder / "axes.gpkg")
-    dialog.setParameters({"INPUT": design, "ELEMENTS": "TEMPORARY_OUTPUT", "AXIS": axes})
-    driver.picture("import_dialog")
-    driver.keep("import log", (yield from press_run(dialog)))
-    driver.keep("imported", dialog.results()["ALIGNMENT_COUNT"])
-    yield from close(dialog)
-    yield 1.0
-    driver.picture("imported_map")
-
-
 def rails(driver: Driver) -> Iterator:
     """Extract the sample's rails, wait, save them, and go on working with them."""
     yield from install(ARCHIVE)
@@ -701,87 +642,6 @@ def _click(place: QgsPointXY) -> Iterator:
     pos = QPoint(round(pixel.x()), round(pixel.y()))
     later(partial(QTest.mouseClick, canvas.viewport(), Qt.MouseButton.LeftButton, pos=pos))
     yield 0.5
-
-
-def deliveries(driver: Driver) -> Iterator:
-    """Write files for other programs, and judge lines from files."""
-    yield from install(ARCHIVE)
-    folder, browser = driver.folder, Browser()
-    dialog = yield from open_dialog("extractrails")
-    paths = {"RAILS": "rails.dxf", "CENTERLINES": "tracks.csv", "QUALITY": "stations_points.csv"}
-    outputs = {name: str(folder / path) for name, path in paths.items()}
-    dialog.setParameters({"INPUT": SAMPLE, **PART, **outputs, "FINDINGS": None, "REPORT": None})
-    driver.keep("log", (yield from press_run(dialog)))
-    yield from close(dialog)
-    layers = QgsProject.instance().mapLayers().values()
-    driver.keep("layers", {layer.name(): layer.featureCount() for layer in layers if layer.isValid()})
-    driver.picture("deliveries")
-    lines = {"RAILS": str(folder / "rails.gpkg"), "CENTERLINES": str(folder / "tracks.gpkg")}
-    dialog = yield from open_dialog("extractrails")
-    skipped = dict.fromkeys(("QUALITY", "FINDINGS", "REPORT"))
-    dialog.setParameters({"INPUT": SAMPLE, **PART, **skipped, **lines})
-    yield from press_run(dialog)
-    yield from close(dialog)
-    dialog = yield from open_dialog("measuretrackgeometry")
-    values = {"INPUT": lines["CENTERLINES"], "RAILS": lines["RAILS"], "STANDARD": PART["STANDARD"]}
-    first = QgsVectorLayer(f"{lines['CENTERLINES']}|subset=track_id = 1", "first track", "ogr")
-    axis = {"AXIS": QgsProject.instance().addMapLayer(first).id(), "START_KM": 12.0}
-    stations, found = str(folder / "stations.gpkg"), str(folder / "found.gpkg")
-    dialog.setParameters({**values, **axis, "OUTPUT": stations, "FINDINGS": found})
-    driver.picture("measure_dialog")
-    driver.keep("measure log", (yield from press_run(dialog)))
-    yield from close(dialog)
-    km = [one["km"] for one in QgsVectorLayer(stations, "stations", "ogr").getFeatures() if one["km"] != NULL]
-    driver.keep("kilometres", [min(km), max(km), len(km)])
-    driver.keep("opened", browser.urls)
-    driver.picture("measured")
-
-
-def alignments(driver: Driver) -> Iterator:
-    """Give the sample's true rails kilometres, compare them with moved copies of themselves, and save both."""
-    yield from install(ARCHIVE)
-    truth = QgsVectorLayer(f"{TRUTH}|subset=kind = 'rail'", "truth", "ogr")
-    later_survey = QgsVectorLayer("LineStringZ?crs=EPSG:32643", "later", "memory")
-    for feature in truth.getFeatures():
-        shape = feature.geometry()
-        shape.translate(0.0, 0.05, 0.01)
-        feature.setGeometry(shape)
-        feature.setFields(later_survey.fields(), True)
-        later_survey.dataProvider().addFeature(feature)
-    box = truth.extent()
-    axis = QgsVectorLayer("LineString?crs=EPSG:32643", "axis", "memory")
-    line = QgsFeature()
-    ends = QgsPointXY(box.xMinimum() - 20, box.yMinimum()), QgsPointXY(box.xMaximum() + 20, box.yMinimum())
-    line.setGeometry(QgsGeometry.fromPolylineXY(ends))
-    axis.dataProvider().addFeature(line)
-    QgsProject.instance().addMapLayers([truth, later_survey, axis])
-    dialog = yield from open_dialog("stationalongaxis")
-    saved = str(driver.folder / "stationed.gpkg")
-    dialog.setParameters({"INPUT": truth.id(), "AXIS": axis.id(), "START_KM": 7.5, "OUTPUT": saved})
-    driver.picture("station_dialog")
-    driver.keep("station log", (yield from press_run(dialog)))
-    yield from close(dialog)
-    found = QgsVectorLayer(saved, "stationed", "ogr")
-    rows = [(one["km"], one["offset_m"], one.geometry().vertexAt(0).x()) for one in found.getFeatures()]
-    driver.keep("kilometres", {"rows": rows, "start": ends[0].x(), "south": ends[0].y()})
-    dialog = yield from open_dialog("comparetracks")
-    given = {"REFERENCE": truth.id(), "INPUT": later_survey.id(), "REFERENCE_SIGMA": 1, "INPUT_SIGMA": 1}
-    outputs = {"OUTPUT": "TEMPORARY_OUTPUT", "REPORT": str(driver.folder / "comparison.html")}
-    dialog.setParameters({**given, "IGNORE_SHIFT": False, **outputs})
-    driver.picture("compare_dialog")
-    driver.keep("compare log", (yield from press_run(dialog)))
-    driver.keep("compare results", dialog.results())
-    yield from close(dialog)
-    (made,) = QgsProject.instance().mapLayersByName("Differences")
-    iface.mapCanvas().setExtent(made.extent())
-    yield 1.0
-    driver.picture("differences")
-    driver.keep("heights", sorted({one["height_mm"] for one in made.getFeatures()}))
-    driver.keep("legend", [item.label() for item in made.renderer().legendSymbolItems()])
-    saved = str(driver.folder / "differences.gpkg")
-    options = QgsVectorFileWriter.SaveVectorOptions()
-    QgsVectorFileWriter.writeAsVectorFormatV3(made, saved, QgsProject.instance().transformContext(), options)
-    driver.keep("saved", QgsVectorLayer(saved, "again", "ogr").featureCount() - made.featureCount())
 
 
 def batch(driver: Driver) -> Iterator:

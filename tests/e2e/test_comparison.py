@@ -1,7 +1,6 @@
 """Compare Tracks through qgis_process: the sample's rails compared with their exact truth."""
 
 import json
-import re
 
 import numpy as np
 import pytest
@@ -45,11 +44,3 @@ def test_differences_and_their_stated_errors(compared):
     assert abs(np.median(gauge)) < 1.0
     marked = results["MOVED_LENGTH"] / results["COMPARED_LENGTH"]
     assert marked == pytest.approx(np.mean([row["moved"] for row in rows]), abs=0.02)
-
-
-def test_the_report_states_the_figures(compared):
-    results, outputs = compared
-    page = outputs["REPORT"].read_text(encoding="utf-8")
-    assert re.search("<strong>.* moved by more than 3 standard errors", page)
-    assert f"<b>{results['ACROSS_RMS']:.1f} mm</b>" in page
-    assert page.count("Line ") >= 6

@@ -4,8 +4,7 @@ import re
 
 import numpy as np
 import pytest
-from lines import read_features
-from osgeo import gdal, ogr
+from osgeo import ogr
 
 STANDARD = "IN_75R_1000"
 HEAD_M = 0.06191
@@ -137,17 +136,6 @@ def test_report_states_the_figures(extracted):
     assert html.count("<svg") == 1 + extracted.results["CENTERLINE_COUNT"]
     for words in ("Schienen 1.laz", "1000 mm", "61.91 mm", "EPSG:32643", extracted.results["ENGINE_USED"]):
         assert words in html
-
-
-def test_cleaned_raster_covers_the_rails(extracted):
-    dataset = gdal.Open(str(extracted.cleaned))
-    assert dataset.GetRasterBand(1).GetDescription() == "10"
-    x, side, _, y, _, _ = dataset.GetGeoTransform()
-    cells = dataset.ReadAsArray()
-    vertices = np.concatenate([line for line, _ in read_features(extracted.rails)])
-    rows, columns = ((y - vertices[:, 1]) / side).astype(int), ((vertices[:, 0] - x) / side).astype(int)
-    near = [cells[row - 1 : row + 2, column - 1 : column + 2].any() for row, column in zip(rows, columns)]
-    assert np.mean(near) > 0.95
 
 
 def test_help_on_the_command_line_is_text(qgis_process_help):

@@ -59,22 +59,3 @@ def test_signals_beside_a_curve_with_posts_and_an_overlap(succeed, folder):
         ("C", 2, "20,4 + 50", "left", 0),
     ]
     np.testing.assert_allclose([row[4] for row in rows], 5.5, atol=0.001)
-
-
-def test_quality_points_of_an_extraction_have_kilometres(extracted, succeed, folder):
-    """The axis is the straight through the ends of the sample; each kilometre is that of the foot on it."""
-    parameters = {"INPUT": extracted.centerlines, "RAILS": extracted.rails, "STANDARD": "IN_75R_1000"}
-    with sqlite3.connect(extracted.rails) as database:
-        west, east, south, north = database.execute("SELECT min_x, max_x, min_y, max_y FROM gpkg_contents").fetchone()
-    ends = np.array([[west - 20, south - 20], [east + 20, north + 20]])
-    axis = write(folder / "axis.geojson", "LineString", [ends.tolist()])
-    output = folder / "quality.gpkg"
-    succeed("measuretrackgeometry", {**parameters, "AXIS": axis, "START_KM": 3.5, "OUTPUT": output})
-    from lines import read_features
-
-    found = read_features(output)
-    places = np.array([place[0, :2] for place, _ in found])
-    along = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
-    s, left = (places - ends[0]) @ along, (places - ends[0]) @ np.array([-along[1], along[0]])
-    np.testing.assert_allclose([values["km"] for _, values in found], 3.5 + s / 1000, atol=2e-6)
-    np.testing.assert_allclose([values["offset_m"] for _, values in found], left, atol=0.001)

@@ -123,43 +123,31 @@ class Outcome:
 
 
 @pytest.fixture
-def run(algorithm, context):
-    """Check the parameters and run Extract Rails, as all front ends of QGIS do."""
-
-    def run(parameters: dict[str, Any], feedback: Feedback | None = None) -> Outcome:
-        return outcome_of(algorithm, {"RAILS": "memory:", **parameters}, context, feedback or Feedback())
-
-    return run
-
-
-@pytest.fixture
 def run_step(qgis, plugin, context):
-    """The same for any algorithm of the plugin, by name."""
-
-    def run(name: str, parameters: dict[str, Any], feedback: Feedback | None = None) -> Outcome:
-        algorithm = qgis.processingRegistry().createAlgorithmById(f"railextract:{name}")
-        return outcome_of(algorithm, parameters, context, feedback or Feedback())
-
-    return run
-
-
-@pytest.fixture
-def outcome(context):
-    """The same for any algorithm."""
+    """Check the parameters and run an algorithm, given by its name if it is the plugin's, as all front ends do."""
 
     def run(algorithm, parameters: dict[str, Any], feedback: Feedback | None = None) -> Outcome:
-        return outcome_of(algorithm, parameters, context, feedback or Feedback())
+        if isinstance(algorithm, str):
+            algorithm = qgis.processingRegistry().createAlgorithmById(f"railextract:{algorithm}")
+        feedback = feedback or Feedback()
+        parameters = {name: str(value) if isinstance(value, Path) else value for name, value in parameters.items()}
+        accepted, message = algorithm.checkParameterValues(parameters, context)
+        if not accepted:
+            return Outcome(False, error=message)
+        results, ok = algorithm.run(parameters, context, feedback)
+        return Outcome(ok, results, "\n".join(feedback.errors))
 
     return run
 
 
-def outcome_of(algorithm, parameters: dict[str, Any], context: QgsProcessingContext, feedback: Feedback) -> Outcome:
-    parameters = {name: str(value) if isinstance(value, Path) else value for name, value in parameters.items()}
-    accepted, message = algorithm.checkParameterValues(parameters, context)
-    if not accepted:
-        return Outcome(False, error=message)
-    results, ok = algorithm.run(parameters, context, feedback)
-    return Outcome(ok, results, "\n".join(feedback.errors))
+@pytest.fixture
+def run(run_step):
+    """The same for Extract Rails."""
+
+    def run(parameters: dict[str, Any], feedback: Feedback | None = None) -> Outcome:
+        return run_step("extractrails", {"RAILS": "memory:", **parameters}, feedback)
+
+    return run
 
 
 @pytest.fixture
@@ -246,14 +234,14 @@ def bench(tmp_path, write_cloud, track, monkeypatch, new_feedback):
 def meet(bench, run_step, monkeypatch):
     """Run with a fault: the result must be that of its row, and no file may be left behind."""
 
-    def meet(fault: Fault, algorithm: str) -> Outcome:
-        algorithm, feedback = fault.run or algorithm, bench.feedback
+    def meet(fault: Fault) -> Outcome:
+        feedback = bench.feedback
         temporary, out = bench.folder / "temporary", bench.folder / "out"
         temporary.mkdir(), out.mkdir()
         monkeypatch.setattr(tempfile, "tempdir", str(temporary))
-        outputs = {Path(name).stem: out / name for name in OUTPUTS[algorithm]}
+        outputs = {Path(name).stem: out / name for name in OUTPUTS[fault.algorithm]}
         with bench.run:
-            outcome = run_step(algorithm, {**outputs, **fault.prepare(bench)}, feedback)
+            outcome = run_step(fault.algorithm, {**outputs, **fault.prepare(bench)}, feedback)
         said = outcome.error.strip() or " ".join(feedback.warnings)
         good = WARNED if feedback.warnings else FINE
         found = good if outcome.ok else REFUSED

@@ -5,24 +5,16 @@ import json
 import laspy
 import numpy as np
 import pytest
-from faults import WARNED, Fault, refused
+from faults import faults
 from laspy.vlrs.known import WktCoordinateSystemVlr
 from rail_extract.core.clouds.crs import import_pyproj
 
-TITLE = "Points and coordinate systems"
-
-TRACK, NOTHING = {"RAIL_COUNT": 2, "CENTERLINE_COUNT": 1}, {"RAIL_COUNT": 0, "CENTERLINE_COUNT": 0}
 PLACE = np.array([500_000.0, 3_000_000.0, 100.0])
 
 
 def of(change):
     """A cloud made from the points of a track of 6 m."""
     return lambda bench: {"INPUT": bench.cloud(change(bench.track(length_m=6.0))), "ITERATIONS": 1}
-
-
-def scattered(*sides_m, count=3600):
-    """Random points in a box."""
-    return of(lambda points: PLACE + np.random.default_rng(2).uniform(0, sides_m, (count, 3)))
 
 
 def strays(count):
@@ -48,123 +40,6 @@ def cross(points):
     return np.concatenate([points, middle + np.column_stack([-y, x, z])])
 
 
-POINTS = [
-    Fault(
-        "100 lines of points 0.3 m apart",
-        lambda bench: {"INPUT": bench.cloud(PLACE + grating(), "cloud.laz"), "ITERATIONS": 1},
-        WARNED,
-        "Only … % of the points of class 10 are within 0.2 m of a rail: check the rail classes and the rail standard.…",
-    ),
-    Fault(
-        "points exactly on a line",
-        of(lambda points: PLACE + np.column_stack([np.linspace(0, 20, 2000), np.zeros((2000, 2))])),
-        WARNED,
-        "No two rails run parallel: there are rails but no track centerlines.",
-        {"RAIL_COUNT": 1, "CENTERLINE_COUNT": 0},
-    ),
-    Fault(
-        "one point",
-        of(lambda points: points[:1]),
-        WARNED,
-        "Class 10 has no rails: check the rail classes, the standard and MIN_LENGTH.",
-        NOTHING,
-    ),
-    Fault(
-        "two points",
-        of(lambda points: points[:2]),
-        WARNED,
-        "Class 10 has no rails: check the rail classes, the standard and MIN_LENGTH.",
-        NOTHING,
-    ),
-    Fault(
-        "all points at one position",
-        of(lambda points: np.tile(points[:1], (3000, 1))),
-        WARNED,
-        "All points of class 10 are within 0 m of each other: if the coordinates are in kilometres, assign a "
-        "coordinate system that says so. Class 10 has no rails: check the rail classes, the standard and MIN_LENGTH.",
-        NOTHING,
-    ),
-    Fault("all points duplicated", of(lambda points: np.repeat(points, 2, axis=0)), gives=TRACK),
-    Fault(
-        "only one rail",
-        scattered(30, 0.07, 0.005),
-        WARNED,
-        "No two rails run parallel: there are rails but no track centerlines.",
-        {"RAIL_COUNT": 1, "CENTERLINE_COUNT": 0},
-    ),
-    Fault(
-        "vertical wall",
-        scattered(30, 0.01, 3),
-        WARNED,
-        "No two rails run parallel: there are rails but no track centerlines.",
-    ),
-    Fault(
-        "points scattered over a square",
-        scattered(6, 6, 0.1),
-        WARNED,
-        "Class 10 has no rails: check the rail classes, the standard and MIN_LENGTH.",
-        NOTHING,
-    ),
-    Fault(
-        "dense patch of points",
-        scattered(2, 2, 0.1, count=20_000),
-        WARNED,
-        "Class 10 has no rails: check the rail classes, the standard and MIN_LENGTH.",
-    ),
-    Fault("tracks crossing at a right angle", of(cross), gives={"RAIL_COUNT": 4, "CENTERLINE_COUNT": 2}),
-    Fault(
-        "track shorter than MIN_LENGTH",
-        of(lambda points: points[points[:, 0] < 500_000.5]),
-        WARNED,
-        "Class 10 has no rails: check the rail classes, the standard and MIN_LENGTH.",
-        NOTHING,
-    ),
-    Fault(
-        "rails of another gauge",
-        of(lambda points: points + np.where(points[:, 1:2] > 3_000_000, [0, 0.1, 0], 0)),
-        WARNED,
-        "Rails are 160… mm apart, with heads 7… mm wide; 1507 mm apart are expected: is it Russia R65, 1520 mm "
-        "(unconfirmed width) (RU_R65_1520)? No track of 1435 mm gauge found.",
-    ),
-    Fault(
-        "stray point 1000 km away", of(lambda points: np.append(points, points[:1] + [1e6, 0, 0], axis=0)), gives=TRACK
-    ),
-    Fault(
-        "stray point 100 km above the track",
-        of(lambda points: np.append(points, points[:1] + [0, 0, 1e5], axis=0)),
-        gives=TRACK,
-    ),
-    Fault("5,000 stray points over 1000 km", of(lambda points: np.concatenate([points, strays(5000)])), gives=TRACK),
-    refused(
-        "5,000 stray points over 1000 km, and nothing else",
-        of(lambda points: strays(5000)),
-        "The points of class 10 are … m apart over … m, too far for rails: if the coordinates are in centimetres or "
-        "millimetres, assign a coordinate system that says so.",
-    ),
-    *(
-        refused(
-            f"coordinates in {unit}, which the file does not state",
-            of(lambda points, factor=factor: PLACE + (points - PLACE) * factor),
-            "The points of class 10 are … m apart over … m, too far for rails: if the coordinates are in centimetres "
-            f"or millimetres, assign a coordinate system that says so.{more}",
-        )
-        for unit, factor, more in (
-            ("centimetres", 100, " For an airborne cloud, use Track Centerlines from Airborne Lidar."),
-            ("millimetres", 1000, ""),
-        )
-    ),
-    Fault(
-        "coordinates in kilometres, which the file does not state",
-        of(lambda points: PLACE + (points - PLACE) / 1000),
-        WARNED,
-        "All points of class 10 are within 0.006 m of each other: if the coordinates are in kilometres, assign a "
-        "coordinate system that says so. Class 10 has no rails: check the rail classes, the standard and MIN_LENGTH.",
-        NOTHING,
-    ),
-    Fault("all heights zero", of(lambda points: points * [1, 1, 0]), gives=TRACK),
-]
-
-
 def tiles(*systems, **parameters):
     """A folder of tiles, each with half of the track's points, in these coordinate systems."""
 
@@ -188,12 +63,6 @@ def in_system(epsg, scale=1.0, place=(0, 0, 0), **parameters):
     return prepare
 
 
-def with_broken_system(bench):
-    path = bench.cloud(bench.track(length_m=6.0))
-    path.write_bytes(path.read_bytes().replace(b"PROJCRS[", b"PROJCRX[").replace(b"PROJCS[", b"PROJCX["))
-    return {"INPUT": path}
-
-
 def with_wkt(change):
     """The coordinate system of the cloud, as WKT, changed."""
 
@@ -208,8 +77,8 @@ def with_wkt(change):
     return prepare
 
 
-def in_unit(length):
-    return with_wkt(lambda wkt: wkt.replace('UNIT["metre",1', f'UNIT["metre",{length}'))
+of_the_moon = with_wkt(lambda wkt: wkt.replace("6378137,298.257223563", "1737400,0"))
+in_units_of_zero = with_wkt(lambda wkt: wkt.replace('UNIT["metre",1', 'UNIT["metre",0'))
 
 
 def beside(system):
@@ -239,108 +108,44 @@ def drawn_in_mercator(bench):
 FEET = 3937 / 1200
 HERE = tuple(PLACE)
 
-SYSTEMS = [
-    Fault(
-        "no coordinate system",
-        in_system(None, 1, HERE),
-        WARNED,
-        "The cloud has no coordinate system: its coordinates are taken as metres. If it has one, choose it as CRS.",
-    ),
-    Fault(
-        "unreadable coordinate system",
-        with_broken_system,
-        WARNED,
-        "The cloud has no coordinate system: its coordinates are taken as metres. If it has one, choose it as CRS.",
-    ),
-    refused(
-        "coordinates in degrees",
-        in_system(4326, (1e-5, 1e-5, 1), (75, 27, 100)),
-        "cloud.las is in degrees (WGS 84), where lengths can't be measured: reproject it, for example to UTM "
-        "zone 43N (EPSG:32643).",
-    ),
-    refused(
-        "coordinates in degrees out of range",
-        in_system(4326, 1, (500_000, 3_000_000, 100)),
-        "cloud.las is in degrees (WGS 84), where lengths can't be measured: reproject it, for example to the "
-        "UTM zone of the place.",
-    ),
-    refused(
-        "CRS in degrees for a cloud without a coordinate system",
-        in_system(None, 1, HERE, CRS="EPSG:4326"),
-        "CRS EPSG:4326 is in degrees, where lengths can't be measured: choose a projected one.",
-    ),
-    refused(
-        "geocentric coordinates",
-        in_system(4978, 1, (5e6, 3e6, 2e6)),
-        "cloud.las: Lengths can't be computed in WGS 84: use a projected coordinate system.",
-    ),
-    Fault(
-        "coordinate system that has no way to WGS 84",
-        with_wkt(lambda wkt: wkt.replace("6378137,298.257223563", "1737400,0")),  # the ellipsoid is that of the Moon
-    ),
-    *(
-        refused(
-            f"coordinate system with a unit of {length} m",
-            in_unit(length),
-            f"cloud.las: WGS 84 / UTM zone 43N states a unit of {float(length):g} m, which is impossible: assign the "
-            "right coordinate system.",
-        )
-        for length in ("0", "-1", "1e300")
-    ),
-    *(
-        refused(
-            f"{name} in place of a height",
-            beside(system),
-            f"cloud.las: Lengths can't be computed in {title}, which measures in {unit}: use a projected coordinate "
-            "system.",
-        )
-        for name, system, title, unit in (("time", TIME, "when", "s"), ("pressure", PRESSURE, "air", "hPa"))
-    ),
-    refused(
-        "time in place of coordinates",
-        with_wkt(lambda wkt: TIME),
-        "cloud.las: Lengths can't be computed in when, which measures in s: use a projected coordinate system.",
-    ),
-    Fault("US survey feet", in_system(2263, FEET, (980_000, 200_000, 300))),
-    Fault("feet in plan, metres in height", in_system("2263+5703", (FEET, FEET, 1), (980_000, 200_000, 100))),
-    Fault(
-        "Web Mercator",
-        in_system(3857, 1, (1_024_000, 6_446_000, 100)),
-        WARNED,
-        "cloud.las is in WGS 84 / Pseudo-Mercator, whose scale factor of 1.557 there makes lengths and gauges wrong: "
-        "reproject it, for example to UTM zone 32N (EPSG:32632).",
-    ),
-    Fault(
-        "rails digitized in Web Mercator",
-        drawn_in_mercator,
-        WARNED,
-        "The lines are in WGS 84 / Pseudo-Mercator, whose scale factor of 1.557 there makes lengths and gauges "
-        "wrong: reproject them, for example to UTM zone 32N (EPSG:32632).",
-        run="buildtrackcenterlines",
-    ),
-    refused(
-        "tiles in different zones",
-        tiles(32643, 32644),
-        "tile0.las is in WGS 84 / UTM zone 43N but tile1.las is in WGS 84 / UTM zone 44N: reproject all tiles to one "
-        "coordinate system first.",
-    ),
-    refused(
-        "one tile without a coordinate system",
-        tiles(32643, None),
-        "tile0.las is in WGS 84 / UTM zone 43N but tile1.las is in no coordinate system: reproject all tiles to one "
-        "coordinate system first.",
-    ),
-    Fault("one tile without a coordinate system, CRS set", tiles(32643, None, CRS="EPSG:32643")),
-]
 
-FAULTS = [*POINTS, *SYSTEMS]
+FAULTS = {
+    "extractrails": {
+        "100 lines of points 0.3 m apart": of(lambda points: PLACE + grating()),
+        "all points at one position": of(lambda points: np.tile(points[:1], (3000, 1))),
+        "all points duplicated": of(lambda points: np.repeat(points, 2, axis=0)),
+        "only one rail": of(lambda points: PLACE + np.random.default_rng(2).uniform(0, (30, 0.07, 0.005), (3600, 3))),
+        "tracks crossing at a right angle": of(cross),
+        "rails of another gauge": of(lambda points: points + np.where(points[:, 1:2] > 3_000_000, [0, 0.1, 0], 0)),
+        "stray point 1000 km away": of(lambda points: np.append(points, points[:1] + [1e6, 0, 0], axis=0)),
+        "5,000 stray points over 1000 km": of(lambda points: np.concatenate([points, strays(5000)])),
+        "coordinates in centimetres, which the file does not state": of(lambda points: PLACE + 100 * (points - PLACE)),
+        "coordinates in millimetres, which the file does not state": of(lambda points: PLACE + 1000 * (points - PLACE)),
+        "coordinates in kilometres, which the file does not state": of(lambda points: PLACE + (points - PLACE) / 1000),
+        "all heights zero": of(lambda points: points * [1, 1, 0]),
+    },
+    "rasterizerailpoints": {
+        "no coordinate system": in_system(None, 1, HERE),
+        "coordinates in degrees": in_system(4326, (1e-5, 1e-5, 1), (75, 27, 100)),
+        "CRS in degrees for a cloud without a coordinate system": in_system(None, 1, HERE, CRS="EPSG:4326"),
+        "geocentric coordinates": in_system(4978, 1, (5e6, 3e6, 2e6)),
+        "coordinate system that has no way to WGS 84": of_the_moon,
+        "coordinate system with a unit of 0 m": in_units_of_zero,
+        "time in place of a height": beside(TIME),
+        "pressure in place of a height": beside(PRESSURE),
+        "US survey feet": in_system(2263, FEET, (980_000, 200_000, 300)),
+        "feet in plan, metres in height": in_system("2263+5703", (FEET, FEET, 1), (980_000, 200_000, 100)),
+        "Web Mercator": in_system(3857, 1, (1_024_000, 6_446_000, 100)),
+        "tiles in different zones": tiles(32643, 32644),
+        "one tile without a coordinate system": tiles(32643, None),
+        "one tile without a coordinate system, CRS set": tiles(32643, None, CRS="EPSG:32643"),
+    },
+    "buildtrackcenterlines": {
+        "rails digitized in Web Mercator": drawn_in_mercator,
+    },
+}
 
 
-@pytest.mark.parametrize("fault", POINTS, ids=lambda fault: fault.name)
-def test_points(meet, fault):
-    meet(fault, "extractrails")
-
-
-@pytest.mark.parametrize("fault", SYSTEMS, ids=lambda fault: fault.name)
-def test_system(meet, fault):
-    meet(fault, "rasterizerailpoints")
+@pytest.mark.parametrize("fault", faults("Points and coordinate systems", FAULTS), ids=str)
+def test_fault(meet, fault):
+    meet(fault)

@@ -7,7 +7,8 @@ import pytest
 from fuzzing.kinds import PLUGIN
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from qgis.core import QgsFeature, QgsGeometry, QgsLineString, QgsPoint, QgsVectorLayer
+from memory_layers import layer_of
+from qgis.core import QgsGeometry, QgsLineString, QgsPoint
 
 BOUNDED = settings(
     max_examples=60,
@@ -32,14 +33,10 @@ LINE = st.lists(st.tuples(NUMBER, NUMBER, NUMBER), min_size=0, max_size=6)
 
 @BOUNDED
 @given(lines=st.lists(LINE, min_size=0, max_size=4))
-def test_arbitrary_lines(qgis, plugin, outcome, lines):
-    layer = QgsVectorLayer("LineStringZ?crs=EPSG:32643", "lines", "memory")
-    for line in lines:
-        feature = QgsFeature()
-        feature.setGeometry(QgsGeometry(QgsLineString([QgsPoint(500_000 + x, 3_000_000 + y, z) for x, y, z in line])))
-        layer.dataProvider().addFeature(feature)
-    algorithm = qgis.processingRegistry().createAlgorithmById("railextract:buildtrackcenterlines")
-    run = outcome(algorithm, {"INPUT": layer, "OUTPUT": "memory:"})
+def test_arbitrary_lines(run_step, lines):
+    lines = [[QgsPoint(500_000 + x, 3_000_000 + y, z) for x, y, z in line] for line in lines]
+    layer = layer_of(*(QgsGeometry(QgsLineString(line)) for line in lines))
+    run = run_step("buildtrackcenterlines", {"INPUT": layer, "OUTPUT": "memory:"})
     assert "Traceback" not in run.error
     assert run.ok or run.error
     assert not run.ok or run.results["CENTERLINE_LENGTH"] >= 0

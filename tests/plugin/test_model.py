@@ -50,16 +50,6 @@ def test_model_is_valid_and_has_the_parameters_of_extract_rails(model, algorithm
         assert model.parameterDefinition(name).defaultValue() == algorithm.parameterDefinition(name).defaultValue()
 
 
-def test_model_designer_opens_it(model):
-    from processing.modeler.ModelerDialog import ModelerDialog
-
-    dialog = ModelerDialog()
-    dialog.loadModel(str(MODEL))
-    assert dialog.model().childAlgorithms().keys() == model.childAlgorithms().keys()
-    dialog.setDirty(False)
-    dialog.close()
-
-
 def test_context_menu_of_extract_rails_opens_a_copy(qgis, plugin, model):
     from processing.gui.ProviderActions import ProviderContextMenuActions
 
@@ -81,7 +71,7 @@ def test_context_menu_of_extract_rails_opens_a_copy(qgis, plugin, model):
     plugin.initProcessing()
 
 
-def test_model_gives_the_lines_of_extract_rails(model, run, outcome, write_cloud, track, tmp_path):
+def test_model_gives_the_lines_of_extract_rails(model, run, run_step, write_cloud, track, tmp_path):
     inputs = {"INPUT": write_cloud(track()), "ITERATIONS": 1, "STEP": 0.5}
     whole = {name: tmp_path / f"{name}.gpkg" for name in ("RAILS", "CENTERLINES", "QUALITY")}
     names = ("rails:RAILS", "centerlines:CENTERLINES", "quality:QUALITY", "centerlines:PAIRED_RAILS")
@@ -89,7 +79,7 @@ def test_model_gives_the_lines_of_extract_rails(model, run, outcome, write_cloud
     steps |= {"quality:FINDINGS": tmp_path / "findings.gpkg", "quality:REPORT": tmp_path / "report.html"}
     assert {definition.name() for definition in model.destinationParameterDefinitions()} == set(steps)
     assert model.parameterDefinition("quality:QUALITY").flags() & QgsProcessingParameterDefinition.Flag.FlagOptional
-    for made in (run({**inputs, **whole}), outcome(model, {**inputs, **steps})):
+    for made in (run({**inputs, **whole}), run_step(model, {**inputs, **steps})):
         assert made.ok, made.error
     for mine, theirs in list(zip(steps.values(), whole.values()))[:2]:
         assert farthest(read_lines(mine), read_lines(theirs)) < 0.001

@@ -3,33 +3,23 @@ import qt6
 
 REFUSED = [
     ("from PyQt5.QtCore import QObject", "PyQt5"),
-    ("import PyQt5", "PyQt5"),
     ("def f():\n    import sip", "sip"),
     ("from qgis.PyQt.QtGui import QIcon, QAction", "QAction"),
-    ("from qgis.PyQt import QtGui\nQtGui.QAction()", "QtGui.QAction"),
-    ("from qgis.PyQt.QtCore import QRegExp", "QRegExp"),
     ("from qgis.PyQt import QtCore\nQtCore.QRegExp('a')", "QRegExp"),
     ("dialog.exec_()", "exec_"),
     ("from qgis.PyQt.QtCore import QVariant\nkind = QVariant.Int", "QVariant.Int"),
-    ("from qgis.PyQt import QtCore\nkind = QtCore.QVariant.Double", "QtCore.QVariant.Double"),
     ("from qgis.core import QgsProcessing\nkind = QgsProcessing.TypeVectorLine", "QgsProcessing.TypeVectorLine"),
-    ("from qgis.core import QgsProcessing as P\nf([P.TypeVectorLine])", "P.TypeVectorLine"),
-    ("from qgis.core import QgsWkbTypes\nkind = QgsWkbTypes.LineStringZ", "QgsWkbTypes.LineStringZ"),
     ("from qgis.PyQt.QtCore import Qt\ncolour = Qt.red", "Qt.red"),
-    ("from qgis.PyQt import QtCore\nside = QtCore.Qt.AlignLeft", "QtCore.Qt.AlignLeft"),
     ("from qgis.PyQt.QtCore import QProcess\nif p.state() == QProcess.NotRunning: pass", "QProcess.NotRunning"),
     ("import qgis.core\nfrom qgis.core import Qgis\nQgis.NotKnownHere", "Qgis.NotKnownHere"),
 ]
 
 ACCEPTED = [
     "from qgis.PyQt.QtCore import QObject, Qt\ncolour = Qt.GlobalColor.red",
-    "from qgis.PyQt.QtWidgets import QAction",
     "from qgis.core import QgsProcessing\nkinds = QgsProcessing.SourceType\nkind = kinds.TypeVectorLine",
     "from qgis.core import Qgis\nif Qgis.QGIS_VERSION_INT >= 33800: pass",
-    "from qgis.core import QgsProcessingParameterNumber as N\nN.Type.Integer",
     "from qgis.core import QgsCoordinateReferenceSystem\nQgsCoordinateReferenceSystem.fromEpsgId(25832)",
     "from qgis.core import QgsProject\nQgsProject.instance().clear()",
-    "from qgis.PyQt import QtCore\nside = QtCore.Qt.AlignmentFlag.AlignLeft",
     "from qgis.PyQt.QtCore import QVariant\nempty = QVariant()",
     "from .compat import INTEGER\nimport numpy as np\nnp.Inf",
     "application.exec()",

@@ -1,4 +1,4 @@
-"""Small clouds in every layout that the readers know, to be damaged."""
+"""Small clouds in every layout that the readers know, to be damaged, and places in them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,15 @@ import numpy as np
 from laspy._compression import lazrsbackend
 from rail_extract.core.clouds.crs import import_pyproj
 
-from .kinds import RAIL
+RAIL = 10
+"""Class of the points of all clouds."""
+
+SHAPES = (
+    '{"type": "Point", "coordinates": [500003, 3000001]}',
+    '{"type": "LineString", "coordinates": [[500000, 3000000], [500009, 3000004]]}',
+    '{"type": "Polygon", "coordinates": [[[500000, 3000000], [500009, 3000000], [500009, 3000009], [5e5, 3e6]]]}',
+)
+"""Seeds, a guide and a mask."""
 
 
 @contextmanager

@@ -12,18 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
+from .clouds import RAIL, SHAPES, write_copc, write_las, write_laz, write_vpc
 from .mutators import mutate, mutate_text
-
-RAIL = 10
-"""Class of the points of all clouds."""
-
-
-SHAPES = (
-    '{"type": "Point", "coordinates": [500003, 3000001]}',
-    '{"type": "LineString", "coordinates": [[500000, 3000000], [500009, 3000004]]}',
-    '{"type": "Polygon", "coordinates": [[[500000, 3000000], [500009, 3000000], [500009, 3000009], [5e5, 3e6]]]}',
-)
-"""Seeds, a guide and a mask."""
 
 
 @dataclass(frozen=True)
@@ -99,8 +89,6 @@ SPOOL_SIDE_M = 100.0
 
 def _make_spool(folder: Path) -> list[Path]:
     """Sort a cloud into squares on disk."""
-    from .clouds import write_las
-
     cloud = write_las(folder)[-1]
     (folder / "work").mkdir()
     _spooled(cloud, folder / "work")
@@ -221,8 +209,6 @@ def _read_shapes(path: Path) -> None:
 
 def _make_names(folder: Path) -> list[Path]:
     """Write the names of two tiles."""
-    from .clouds import write_las
-
     tiles = write_las(folder)[:2]
     path = folder / "names.txt"
     path.write_text("".join(f"{tile}\n" for tile in tiles), encoding="utf-8")
@@ -266,15 +252,6 @@ def _read_moving(path: Path) -> None:
         raise AssertionError("the temporary folder is still there")
 
 
-def _clouds(name: str) -> Callable[[Path], Sequence[Path]]:
-    def make(folder: Path) -> Sequence[Path]:
-        from . import clouds
-
-        return getattr(clouds, f"write_{name}")(folder)
-
-    return make
-
-
 def _layers(name: str, function: str) -> Callable[[Path], Sequence[Path]]:
     def call(path: Path) -> Sequence[Path]:
         from . import layers
@@ -285,9 +262,11 @@ def _layers(name: str, function: str) -> Callable[[Path], Sequence[Path]]:
 
 
 CORE = (
-    *(Kind(name, _clouds(name), _read_cloud) for name in ("las", "laz", "copc")),
-    Kind("copied", _clouds("las"), _copy_cloud),
-    Kind("vpc", _clouds("vpc"), _read_cloud, mutate_text),
+    Kind("las", write_las, _read_cloud),
+    Kind("laz", write_laz, _read_cloud),
+    Kind("copc", write_copc, _read_cloud),
+    Kind("copied", write_las, _copy_cloud),
+    Kind("vpc", write_vpc, _read_cloud, mutate_text),
     Kind("weights", _make_weights, _read_weights),
     Kind("work", _make_spool, _read_spool),
     Kind("stored", _make_stored, _read_stored),

@@ -32,8 +32,7 @@ from rail_extract.core.progress import Progress  # noqa: E402
 from rail_extract.core.squares import steps  # noqa: E402
 from rail_extract.core.tracks import centerlines  # noqa: E402
 
-from .clouds import write_las  # noqa: E402
-from .kinds import SHAPES  # noqa: E402
+from .clouds import SHAPES, write_las  # noqa: E402
 
 PAGE_BYTES = 512
 """Smallest page of a GeoPackage: a file of small pages has little that is never read."""

@@ -64,20 +64,6 @@ def test_the_rails_of_every_family_keep_to_their_tracks(family, seed):
         assert step.min() > 0.01 and step.max() < 0.03
 
 
-def test_openings_guard_rails_and_third_rails_are_in_some_families_only():
-    def lay(family):
-        return [random_layout(np.random.default_rng(seed), SIZE, family) for seed in range(8)]
-
-    assert all(len(layout.rails) == 2 for layout in lay("plain"))
-    assert all(len(layout.openings) == 4 for layout in lay("diamond"))
-    assert all(
-        len(layout.rails) == 3 and len({rail.track for rail in layout.rails}) == 1 for layout in lay("dual gauge")
-    )
-    assert all(len(layout.distractors) == 1 for layout in lay("buffer end"))
-    assert all(len(layout.rails) >= 10 for layout in lay("yard"))
-    assert any(layout.distractors for layout in lay("crossover"))
-
-
 def test_guard_rails_leave_a_flangeway_inside_their_rail():
     main = trace([Element(100.0)])
     found = []

@@ -2,17 +2,15 @@
 
 import numpy as np
 import pytest
+from memory_layers import layer_of
 from qgis.core import (
     QgsCoordinateReferenceSystem,
     QgsCoordinateTransform,
-    QgsFeature,
-    QgsField,
     QgsGeometry,
     QgsPointXY,
     QgsProject,
     QgsVectorLayer,
 )
-from qgis.PyQt.QtCore import QVariant
 from rail_extract.laboratory.airborne.designs import curved_line, drawn_together
 from rail_extract.laboratory.airborne.flight import Flight, fly
 from rail_extract.laboratory.airborne.write import CRS, ORIGIN, write_airborne
@@ -28,24 +26,23 @@ def flown(tmp_path_factory):
     return design, path
 
 
-def layer_of(design, crs, off_m=0.4, **stated):
-    layer = QgsVectorLayer(f"LineString?crs={crs}", "guides", "memory")
-    layer.dataProvider().addAttributes([QgsField(name, QVariant.String) for name in stated])
-    layer.updateFields()
-    change = QgsCoordinateTransform(QgsCoordinateReferenceSystem(CRS), layer.crs(), QgsProject.instance())
-    for number, guide in enumerate(drawn_together(design.tracks[-1:] if off_m > 1 else design.tracks, 5, off_m=off_m)):
-        feature = QgsFeature(layer.fields())
-        shape = QgsGeometry.fromPolylineXY([QgsPointXY(x, y) for x, y in guide + ORIGIN[:2]])
+def guides(tracks, crs=CRS, off_m=0.4, fields="", values=()):
+    """Lines drawn along tracks."""
+    change = QgsCoordinateTransform(*map(QgsCoordinateReferenceSystem, (CRS, crs)), QgsProject.instance())
+    lines = drawn_together(tracks, 5, off_m=off_m)
+    shapes = [QgsGeometry.fromPolylineXY([QgsPointXY(*place) for place in line + ORIGIN[:2]]) for line in lines]
+    for shape in shapes:
         shape.transform(change)
-        feature.setGeometry(shape)
-        feature.setAttributes([values[number] for values in stated.values()])
-        assert layer.dataProvider().addFeature(feature)
-    return layer
+    return layer_of(*shapes, kind="LineString", crs=crs, fields=fields, values=values)
 
 
 def test_lines_stations_and_report_from_guides_in_degrees(flown, run_step, tmp_path, new_feedback):
     design, path = flown
-    guide = layer_of(design, "EPSG:4326", name=["down", "up"], ref=["1", "1"], gauge=["1435", "1435;1000"])
+    fields, values = (
+        "&field=name:string&field=ref:string&field=gauge:string",
+        [("down", "1", "1435"), ("up", "1", "1435;1000")],
+    )
+    guide = guides(design.tracks, "EPSG:4326", fields=fields, values=values)
     outputs = {name: tmp_path / f"{name}.gpkg" for name in ("CENTERLINES", "STATIONS", "FINDINGS")}
     values = {"INPUT": path, "GUIDE": guide, "FOOTPRINT": 0.25, "REPORT": tmp_path / "report.html", **outputs}
     feedback = new_feedback()
@@ -97,7 +94,7 @@ def test_guides_are_proposed_and_lead_to_lines(flown, run_step, tmp_path, new_fe
 
 def test_a_cloud_without_the_track_gives_no_line_but_reasons(flown, run_step, tmp_path):
     design, path = flown
-    guide = layer_of(design, CRS, off_m=7.0)
+    guide = guides(design.tracks[-1:], off_m=7.0)
     outputs = {name: tmp_path / f"{name}.gpkg" for name in ("CENTERLINES", "STATIONS", "FINDINGS")}
     done = run_step("airbornecenterlines", {"INPUT": path, "GUIDE": guide, "FOOTPRINT": 0.25, **outputs})
     assert done.ok, done.error

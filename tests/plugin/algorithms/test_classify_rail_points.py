@@ -5,10 +5,10 @@ import re
 import laspy
 import numpy as np
 import pytest
+from memory_layers import layer_of
 from qgis.core import (
     QgsCoordinateReferenceSystem,
     QgsCoordinateTransform,
-    QgsFeature,
     QgsGeometry,
     QgsPointXY,
     QgsProject,
@@ -66,11 +66,8 @@ def test_a_guide_in_degrees_chooses_the_track(raw, run_step, tmp_path, left_m, f
     utm, degrees = QgsCoordinateReferenceSystem("EPSG:32643"), QgsCoordinateReferenceSystem("EPSG:4326")
     shape = QgsGeometry.fromPolylineXY([QgsPointXY(*end) for end in ends])
     shape.transform(QgsCoordinateTransform(utm, degrees, QgsProject.instance()))
-    layer = QgsVectorLayer("LineString?crs=EPSG:4326", "guide", "memory")
-    feature = QgsFeature()
-    feature.setGeometry(shape)
-    layer.dataProvider().addFeature(feature)
-    values = {"INPUT": raw[0], "GUIDE": layer, "ONLY_GUIDED": True, "OUTPUT": tmp_path / "new.laz"}
+    guide = layer_of(shape, kind="LineString", crs="EPSG:4326")
+    values = {"INPUT": raw[0], "GUIDE": guide, "ONLY_GUIDED": True, "OUTPUT": tmp_path / "new.laz"}
     done = run_step("classifyrailpoints", values)
     assert done.ok, done.error
     assert done.results["PAIRED_LENGTH"] == pytest.approx(19 if found else 0, abs=2)
@@ -104,10 +101,3 @@ def test_the_standard_of_a_raw_cloud_is_detected(raw, run, new_feedback, tmp_pat
     assert done.results["RAIL_COUNT"] == 2
     (said,) = (text for text in feedback.infos if text.startswith("Detected "))
     assert re.search(r"rails are 15\d\d mm apart, head \d\d ± \d mm; fits .*, also ", said)
-
-
-def test_a_raw_cloud_without_the_tick_is_explained(raw, run, tmp_path):
-    for standard in ("DETECT", "EN_60E1_1435"):
-        done = run({"INPUT": raw[0], "STANDARD": standard, "RAILS": tmp_path / "rails.gpkg"})
-        assert done.error.startswith("The cloud has no points of class 10; its classes, with the number of points, are")
-        assert done.error.endswith("set the rail classes or, if nobody has classified the cloud, CLASSIFY.")

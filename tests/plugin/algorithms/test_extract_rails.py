@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from lines import farthest, read_features
+from memory_layers import layer_of
 from osgeo import gdal
 from qgis.core import (
     QgsCoordinateReferenceSystem,
     QgsCoordinateTransform,
-    QgsFeature,
     QgsGeometry,
     QgsProcessingOutputLayerDefinition,
     QgsProcessingUtils,
@@ -106,35 +106,29 @@ def same_rasters(path, other):
     assert first.GetSpatialRef().IsSame(second.GetSpatialRef())
     assert first.GetMetadata() == second.GetMetadata()
     one, two = first.GetRasterBand(1), second.GetRasterBand(1)
-    for name in ("GetDescription", "GetNoDataValue", "GetBlockSize", "DataType"):
-        values = [getattr(band, name) for band in (one, two)]
-        values = [value() if callable(value) else value for value in values]
-        assert values[0] == values[1], name
+    for name in ("GetDescription", "GetNoDataValue", "GetBlockSize"):
+        assert getattr(one, name)() == getattr(two, name)(), name
+    assert one.DataType == two.DataType
 
 
 def test_outputs_left_blank_in_the_batch_dialog_are_skipped(run, scene, tmp_path):
     blank = {name: QgsProcessingOutputLayerDefinition("", None) for name in ("CENTERLINES", "QUALITY", "CLEANED")}
     outcome = run({**scene, **blank, "RAILS": tmp_path / "rails.gpkg", "REPORT": ""})
     assert outcome.ok, outcome.error
-    assert {name: outcome.results.get(name) for name in (*blank, "REPORT", "SIGMA")} == dict.fromkeys(
-        (*blank, "REPORT", "SIGMA")
-    )
+    assert not {*blank, "REPORT", "SIGMA"} & {name for name, value in outcome.results.items() if value is not None}
     assert [path.name for path in tmp_path.glob("*.gpkg")] == ["rails.gpkg"]
 
 
 @pytest.mark.parametrize("crs", ["EPSG:32643", "EPSG:4326"])
 def test_a_mask_limits_the_points(run, scene, outputs, crs):
     """Two polygons that overlap, around 6 m of the track."""
-    mask = QgsVectorLayer(f"Polygon?crs={crs}", "mask", "memory")
-    change = QgsCoordinateTransform(
-        QgsCoordinateReferenceSystem("EPSG:32643"), mask.crs(), QgsProject.instance().transformContext()
-    )
-    for west, east in ((500_002, 500_006), (500_005, 500_008)):
-        feature = QgsFeature()
-        shape = QgsGeometry.fromRect(QgsRectangle(west, 2_999_990, east, 3_000_010))
+    systems = map(QgsCoordinateReferenceSystem, ("EPSG:32643", crs))
+    change = QgsCoordinateTransform(*systems, QgsProject.instance().transformContext())
+    sides = ((500_002, 500_006), (500_005, 500_008))
+    shapes = [QgsGeometry.fromRect(QgsRectangle(west, 2_999_990, east, 3_000_010)) for west, east in sides]
+    for shape in shapes:
         shape.transform(change)
-        feature.setGeometry(shape)
-        assert mask.dataProvider().addFeature(feature)
+    mask = layer_of(*shapes, kind="Polygon", crs=crs)
     outcome = run({**scene, **outputs, "MASK": mask})
     assert outcome.ok, outcome.error
     assert outcome.results["RAIL_COUNT"] == 2
@@ -143,11 +137,8 @@ def test_a_mask_limits_the_points(run, scene, outputs, crs):
 
 def test_an_axis_gives_the_track_geometry_kilometres(run, scene, tmp_path, new_feedback):
     """The axis runs west, 5 m south of the track, with kilometres as M values."""
-    axis = QgsVectorLayer("LineStringM?crs=EPSG:32643&field=ref:string(9)", "axis", "memory")
-    feature = QgsFeature(axis.fields())
-    feature.setGeometry(QgsGeometry.fromWkt("LINESTRING M(500020 2999995 17.1, 499990 2999995 17.13)"))
-    feature.setAttributes(["4711"])
-    assert axis.dataProvider().addFeature(feature)
+    line = "LINESTRING M(500020 2999995 17.1, 499990 2999995 17.13)"
+    axis = layer_of(line, kind="LineStringM", fields="&field=ref:string(9)", values=[("4711",)])
     page, feedback = tmp_path / "report.html", new_feedback()
     outcome = run({**scene, "AXIS": axis, "QUALITY": tmp_path / "quality.gpkg", "REPORT": page}, feedback)
     assert outcome.ok, outcome.error
@@ -160,13 +151,6 @@ def test_an_axis_gives_the_track_geometry_kilometres(run, scene, tmp_path, new_f
         assert station["offset_m"] == pytest.approx(-5, abs=0.05)
         assert (station["axis"], station["side"], station["piece"]) == ("4711", "right", 1)
     assert f"<td>{stations[0]['km_text']} to {stations[-1]['km_text']}</td>" in page.read_text(encoding="utf-8")
-
-
-def test_a_mask_without_polygons_is_refused(run, scene, outputs):
-    mask = QgsVectorLayer("Polygon?crs=EPSG:32643", "mask", "memory")
-    outcome = run({**scene, **outputs, "MASK": mask})
-    assert not outcome.ok
-    assert outcome.error == "MASK has no polygons: give a polygon layer."
 
 
 def test_rails_of_two_classes_make_a_track_when_merged(run, new_feedback, write_cloud, track, tmp_path):
@@ -182,10 +166,6 @@ def test_rails_of_two_classes_make_a_track_when_merged(run, new_feedback, write_
     assert (apart.results["CENTERLINE_COUNT"], merged.results["CENTERLINE_COUNT"]) == (0, 1)
     assert any("Rails of the classes 10, 11 form tracks" in text for text in feedback.warnings)
     assert {items["class_code"] for _, items in read_features(tmp_path / "rails.gpkg")} == {11}
-
-
-def test_report_is_no_output_that_stops_the_batch_dialog(algorithm):
-    assert algorithm.outputDefinition("REPORT").type() == "outputFile"
 
 
 def test_cleaned_raster_equals_that_of_the_steps(run, run_step, scene, tmp_path):
@@ -207,22 +187,6 @@ def places_of(path):
     x, side, _, y, _, _ = dataset.GetGeoTransform()
     rows, columns = np.nonzero(dataset.ReadAsArray())
     return np.column_stack([x + (columns + 0.5) * side, y - (rows + 0.5) * side])
-
-
-def test_report_and_its_figures(run, scene, tmp_path):
-    path = tmp_path / "Bericht östlich.html"
-    outcome = run({**scene, "REPORT": path})
-    assert outcome.ok, outcome.error
-    assert outcome.results["REPORT"] == str(path)
-    html = path.read_text(encoding="utf-8")
-    assert "<h1>Rail Extract report</h1>" in html
-    for words in ("cloud.las", "EN 60E1", "1435 mm", "72 mm", "EPSG:32643", "Track 1", outcome.results["ENGINE_USED"]):
-        assert words in html, words
-    assert "railextract:extractrails" in html  # the command that repeats the run
-    assert "QUALITY" not in outcome.results
-    assert outcome.results["STATION_COUNT"] > 10
-    assert 0 < outcome.results["SIGMA"] < 5
-    assert outcome.results["BRIDGED_LENGTH"] == 0
 
 
 def test_findings_are_the_table_of_the_report(run, write_cloud, track, tmp_path):
@@ -251,17 +215,6 @@ def test_findings_are_the_table_of_the_report(run, write_cloud, track, tmp_path)
         assert finding["reason"] in row
 
 
-def test_a_single_rail_is_not_a_track_and_the_report_says_so(run, write_cloud, track, outputs, tmp_path):
-    points = track()
-    more = {"QUALITY": tmp_path / "quality.gpkg", "REPORT": tmp_path / "report.html"}
-    outcome = run({"INPUT": write_cloud(points[points[:, 1] < 3_000_000]), "ITERATIONS": 1, **outputs, **more})
-    assert outcome.ok, outcome.error
-    assert (outcome.results["RAIL_COUNT"], outcome.results["CENTERLINE_COUNT"]) == (1, 0)
-    assert (outcome.results["STATION_COUNT"], outcome.results["BRIDGED_LENGTH"]) == (0, 0)
-    assert lines_of(more["QUALITY"])[1] == []
-    assert "No track was found." in more["REPORT"].read_text(encoding="utf-8")
-
-
 def test_strips_are_stated_and_aligned(run, write_cloud, track, tmp_path, new_feedback):
     points = np.concatenate([track(length_m=20.0)] * 2)
     strips = np.repeat([7, 9], len(points) // 2)
@@ -286,19 +239,6 @@ def test_strips_are_stated_and_aligned(run, write_cloud, track, tmp_path, new_fe
         _, (line,) = lines_of(paths["CENTERLINES"])
         middle[how] = np.mean([vertex.y() for vertex in line.geometry().vertices()]) - 3_000_000
     assert middle["ALIGNED"] == pytest.approx(0.010, abs=0.001)
-
-
-def test_without_quality_and_report_nothing_is_measured(run, scene):
-    outcome = run(scene)
-    assert outcome.ok, outcome.error
-    assert "STATION_COUNT" not in outcome.results
-
-
-def test_memory_layers(run, scene, context):
-    outcome = run({**scene, "RAILS": "TEMPORARY_OUTPUT", "CENTERLINES": "memory:tracks"})
-    assert outcome.ok, outcome.error
-    rails = context.getMapLayer(outcome.results["RAILS"])
-    assert rails.featureCount() == outcome.results["RAIL_COUNT"]
 
 
 def test_the_log_names_steps_figures_and_verdict(run, scene, new_feedback, tmp_path):
@@ -329,10 +269,9 @@ def test_progress_advances_to_the_end(run, scene, new_feedback):
     assert feedback.progress[-1] == pytest.approx(100)
 
 
-@pytest.mark.parametrize("share", [25, 90])
-def test_cancelled_run_writes_nothing_and_deletes_temporary_points(run, scene, outputs, new_feedback, share):
+def test_cancelled_run_writes_nothing_and_deletes_temporary_points(run, scene, outputs, new_feedback):
     # The folder may be shared with other processes, which have their own temporary points there.
-    shared, feedback = Path(QgsProcessingUtils.tempFolder()).parent, new_feedback(cancel_at=share)
+    shared, feedback = Path(QgsProcessingUtils.tempFolder()).parent, new_feedback(cancel_at=25)
     folders, others = set(), set(shared.glob(f"{PREFIX}*"))
     feedback.progressChanged.connect(lambda _: folders.update(one.parent.parent for one in shared.glob(POINTS)))
     outcome = run({**scene, **outputs}, feedback)
@@ -361,17 +300,6 @@ def test_if_one_output_fails_the_others_are_complete(run, scene, outputs, tmp_pa
     assert len(lines_of(outputs["RAILS"])[1]) == 2
     assert len(lines_of(more["QUALITY"])[1]) > 10
     assert "Track 1" in more["REPORT"].read_text(encoding="utf-8")
-
-
-def test_rails_of_another_gauge_are_written_without_tracks(run, outputs, write_cloud, track, new_feedback):
-    feedback = new_feedback()
-    outcome = run({"INPUT": write_cloud(track(spacing_m=1.592)), "STANDARD": "EN_60E1_1435", **outputs}, feedback)
-    assert outcome.ok, outcome.error
-    assert (outcome.results["RAIL_COUNT"], outcome.results["CENTERLINE_COUNT"]) == (2, 0)
-    (asked,) = [warning for warning in feedback.warnings if "?" in warning]
-    assert "is it Russia R65, 1520 mm" in asked
-    assert lines_of(outputs["RAILS"])[0].featureCount() == 2
-    assert lines_of(outputs["CENTERLINES"])[0].featureCount() == 0
 
 
 def test_another_gauge_is_reported_before_the_run(run, write_cloud, track, new_feedback):

@@ -23,10 +23,6 @@ def layer(kind, *texts, fields="", values=(), crs="EPSG:32643"):
     return layer_of(*shapes, kind=kind, crs=crs, fields=fields, values=values)
 
 
-def table(rows):
-    return layer_of(kind="None", fields="&field=km_back:double&field=km_ahead:double", values=rows)
-
-
 AXIS = "LINESTRING(0 0, 1000 0)"
 AXIS_M = "LINESTRING M(0 0 12000, 1000 0 13000)"
 PLACES = ("POINT(100 4)", "POINT(250.5 -2.5)", "POINT(999 0)")
@@ -107,7 +103,8 @@ def test_posts_with_texts_and_a_field_of_their_own(station):
 
 def test_jumps_with_a_gap_and_an_overlap(station):
     places = layer("Point", "POINT(150 0)", "POINT(350 0)", "POINT(650 0)")
-    jumps = table([(2.2, 2.3), (2.6, 2.45)])
+    fields = "&field=km_back:double&field=km_ahead:double"
+    jumps = layer_of(kind="None", fields=fields, values=[(2.2, 2.3), (2.6, 2.45)])
     _, values, _ = station(places, layer("LineString", AXIS), START_KM=2.0, JUMPS=jumps, FORMAT="GERMAN")
     assert values["km"] == [2.15, 2.45, 2.6]
     assert values["piece"] == [1, 2, 3]

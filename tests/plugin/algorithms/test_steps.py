@@ -1,13 +1,11 @@
 """The four steps, individually and chained."""
 
-import json
 import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from lines import farthest, read_features, read_lines
-from osgeo import gdal
 from qgis.core import QgsRasterLayer
 from rail_extract.core.frpdf import engine
 from rail_extract.core.raster import cell_size
@@ -59,55 +57,6 @@ def test_chained_steps_give_the_lines_of_extract_rails(chain, run, write_cloud, 
     ((_, mine),), ((_, theirs),) = read_features(tracks), read_features(whole["CENTERLINES"])
     assert mine["bridged_m"] == pytest.approx(theirs["bridged_m"], abs=2 * LAST_DIGIT)
     assert mine["bridged_m"] == pytest.approx(4.0, abs=0.2)
-
-
-INTERFACE = {
-    "rasterizerailpoints": (
-        "INPUT RAIL_CLASSES=10 STANDARD=EN_60E1_1435 GAUGE HEAD_WIDTH EXTENT MASK CRS LEAVE_OUT OUTPUT",
-        {"OUTPUT": "outputRaster"},
-    ),
-    "frpdfcleanup": (
-        "INPUT MODEL=AUTO ITERATIONS=2 ENGINE=AUTO DEVICE=AUTO GAUGE HEAD_WIDTH OUTPUT",
-        {"OUTPUT": "outputRaster", "ENGINE_USED": "outputString"},
-    ),
-    "vectorizerails": (
-        "INPUT POINTS SMOOTHING_XY=0.8 SMOOTHING_Z TOLERANCE_XY=0.1 TOLERANCE_Z=0.03 CROWN_RADIUS=20.0 MAX_GAP=5.0 "
-        "GAP_ANGLE=10.0 SIMPLIFY_XY=0.001 SIMPLIFY_Z=0.0005 MIN_LENGTH=1.0 GAUGE HEAD_WIDTH LEAVE_OUT OUTPUT",
-        {"OUTPUT": "outputVector", "RAIL_COUNT": "outputNumber", "RAIL_LENGTH": "outputNumber"},
-    ),
-    "buildtrackcenterlines": (
-        "INPUT STANDARD=EN_60E1_1435 GAUGE HEAD_WIDTH OTHER_GAUGES CENTERLINE_TOLERANCE=0.05 MAX_GAP=5.0 "
-        "SMOOTHING_XY=0.8 SIMPLIFY_XY=0.001 SIMPLIFY_Z=0.0005 MIN_LENGTH=1.0 OUTPUT RAILS",
-        {
-            "OUTPUT": "outputVector",
-            "RAILS": "outputVector",
-            "CENTERLINE_COUNT": "outputNumber",
-            "CENTERLINE_LENGTH": "outputNumber",
-        },
-    ),
-    "measuretrackgeometry": (
-        "INPUT RAILS POINTS STEP=1.0 STANDARD=EN_60E1_1435 GAUGE HEAD_WIDTH OTHER_GAUGES LEAVE_OUT WORKERS=0 "
-        "AXIS START_KM DIRECTION=INCREASING POSTS POST_FIELD JUMPS FORMAT=HECTOMETRES OUTPUT FINDINGS REPORT",
-        {
-            "OUTPUT": "outputVector",
-            "FINDINGS": "outputVector",
-            "REPORT": "outputFile",
-            "STATION_COUNT": "outputNumber",
-            "SIGMA": "outputNumber",
-            "BRIDGED_LENGTH": "outputNumber",
-        },
-    ),
-}
-"""Parameters with their defaults, and outputs: the interface on which users' scripts depend."""
-
-
-@pytest.mark.parametrize("name", INTERFACE)
-def test_parameters_and_outputs_match_the_interface(qgis, plugin, name):
-    algorithm = qgis.processingRegistry().createAlgorithmById(f"railextract:{name}")
-    parameters, outputs = INTERFACE[name]
-    found = [(one.name(), one.defaultValue()) for one in algorithm.parameterDefinitions()]
-    assert " ".join(one if default is None else f"{one}={default}" for one, default in found) == parameters
-    assert {output.name(): output.type() for output in algorithm.outputDefinitions()} == outputs
 
 
 @pytest.fixture
@@ -196,51 +145,6 @@ def test_vectorize_with_points_follows_the_railheads_in_every_unit(
         assert np.abs(line[:, 1] + south_m - 3_000_000 - side).max() < 0.005  # at the ends, which points show less
         assert np.abs(line[:, 2] - 100).max() < 0.004
     assert all(items["class_code"] == 10 and items["points"] > 1000 for _, items in read_features(rails))
-
-
-def test_raster_from_other_software_needs_gauge_and_head_width(run_step, raster, cloud, tmp_path):
-    other = tmp_path / "other.tif"
-    gdal.Translate(
-        str(other),
-        str(raster),
-        metadataOptions=["RAIL_GAUGE_MM=", "RAIL_HEAD_MM="],
-        creationOptions=["PROFILE=GeoTIFF"],
-    )
-    for name in ("frpdfcleanup", "vectorizerails"):
-        outcome = run_step(name, {"INPUT": other, "OUTPUT": "TEMPORARY_OUTPUT"})
-        assert "fill in GAUGE and HEAD_WIDTH" in outcome.error
-    outcome = run_step("vectorizerails", {"INPUT": other, "GAUGE": 1435, "HEAD_WIDTH": 72, "OUTPUT": "memory:"})
-    assert outcome.ok, outcome.error
-    assert outcome.results["RAIL_COUNT"] == 2
-
-
-def test_points_of_another_area_are_refused(run_step, raster, write_cloud, track, tmp_path):
-    for points, given, sentence in (
-        (track(), {"epsg": 32644}, "POINTS are in WGS 84 / UTM zone 44N but the raster in WGS 84 / UTM zone 43N"),
-        (track() + [5000, 0, 0], {}, "POINTS have no point of class 10 in the area of the raster"),
-        (track(), {"class_code": 11}, "POINTS have no point of class 10"),
-    ):
-        other = write_cloud(points, "other.las", **given)
-        outcome = run_step("vectorizerails", {"INPUT": raster, "POINTS": other, "OUTPUT": tmp_path / "r.gpkg"})
-        assert sentence in outcome.error
-        assert not (tmp_path / "r.gpkg").exists()
-
-
-@pytest.mark.parametrize("name", ["rasterizerailpoints", "vectorizerails"])
-def test_tiles_in_different_coordinate_systems_are_refused_with_their_names(
-    run_step, raster, write_cloud, track, tmp_path, name
-):
-    folder = tmp_path / "tiles"
-    folder.mkdir()
-    for number, epsg in enumerate((32643, 32644)):
-        write_cloud(track(), f"tile{number}.las", epsg=epsg, folder=folder)
-    catalogue = folder / "all.vpc"
-    catalogue.write_text(json.dumps({"features": [{"assets": {"data": {"href": f"./tile{n}.las"}}} for n in (0, 1)]}))
-    for source in (folder, catalogue):
-        given = {"INPUT": source} if name == "rasterizerailpoints" else {"INPUT": raster, "POINTS": source}
-        outcome = run_step(name, {**given, "OUTPUT": "TEMPORARY_OUTPUT"})
-        assert "tile0.las" in outcome.error
-        assert "tile1.las" in outcome.error
 
 
 @pytest.mark.parametrize("name", ["rasterizerailpoints", "frpdfcleanup", "vectorizerails"])

@@ -1,5 +1,3 @@
-import json
-
 import pytest
 from qgis.core import QgsCoordinateReferenceSystem, QgsPointCloudLayer, QgsProject, QgsProperty, QgsVectorLayer
 from rail_extract.core.clouds.readers import read_header
@@ -21,16 +19,10 @@ def layer(path):
     return layer
 
 
-def test_path(path, context):
-    assert cloud_source(str(path), context) == CloudSource((path,))
-
-
-def test_folder_is_left_to_the_core(path, context):
-    assert cloud_source(str(path.parent), context) == CloudSource((path.parent,))
-
-
-def test_property_of_a_batch(path, context):
-    assert cloud_source(QgsProperty.fromValue(str(path)), context).paths == (path,)
+def test_a_file_or_a_folder_is_left_to_the_core(path, context):
+    for place in (path, path.parent):
+        for given in (str(place), QgsProperty.fromValue(str(place))):
+            assert cloud_source(given, context) == CloudSource((place,))
 
 
 def test_layer_has_its_coordinate_system(path, layer, context):
@@ -56,10 +48,6 @@ def catalogue_layer(path, context):
     return layer
 
 
-def test_layer_as_in_its_file_is_read(catalogue_layer, context):
-    assert "UTM zone 43N" in cloud_source(catalogue_layer, context).crs_wkt
-
-
 def test_filtered_layer_is_refused(catalogue_layer, context):
     assert catalogue_layer.setSubsetString("Classification = 2")
     with pytest.raises(CloudError, match=r'"my tiles" is filtered \(Classification = 2\), but a run reads all points'):
@@ -72,28 +60,10 @@ def test_layer_with_another_system_than_its_file_is_refused(catalogue_layer, con
         cloud_source(catalogue_layer, context)
 
 
-def test_virtual_point_cloud_is_left_to_the_core(path, context):
-    catalogue = path.with_name("all.vpc")
-    catalogue.write_text(json.dumps({"features": [{"assets": {"data": {"href": f"./{path.name}"}}}]}))
-    assert cloud_source(str(catalogue), context).paths == (catalogue,)
-
-
-def test_virtual_point_cloud_of_a_missing_tile_is_refused_at_once(tmp_path, context):
-    catalogue = tmp_path / "all.vpc"
-    catalogue.write_text(json.dumps({"features": [{"assets": {"data": {"href": "gone.laz"}}}]}))
-    with pytest.raises(CloudError, match="which does not exist"):
-        cloud_source(str(catalogue), context)
-
-
 @pytest.mark.parametrize("value", [None, ""])
 def test_missing_value(context, value):
     with pytest.raises(CloudError, match="No point cloud was given"):
         cloud_source(value, context)
-
-
-def test_missing_path(tmp_path, context):
-    with pytest.raises(CloudError, match=r"gone\.laz does not exist"):
-        cloud_source(str(tmp_path / "gone.laz"), context)
 
 
 def test_loaded_layer_of_another_kind(context):

@@ -6,17 +6,15 @@ import numpy as np
 import pytest
 from osgeo import gdal
 from rail_extract.core.clouds.crs import import_pyproj
-from rail_extract.core.disk import Destination
-from rail_extract.core.errors import Cancelled, ModelError, ParameterError, RasterError
+from rail_extract.core.errors import ModelError, ParameterError, RasterError
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.frpdf.cleanup import clean
 from rail_extract.core.output import raster_file
-from rail_extract.core.output.raster_file import BLOCK, header_for, on_one_grid
-from rail_extract.core.progress import Progress
+from rail_extract.core.output.raster_file import header_for, on_one_grid
 from rail_extract.core.raster import TILE, cell_size, rasterize
 from rail_extract.core.standards import STANDARDS
 from rail_extract.core.vectorize import vectorize
-from rail_extract.rail_extract_plugin.reading.geotiff import filled_blocks, read_header, read_rasters, write_rasters
+from rail_extract.rail_extract_plugin.reading.geotiff import read_header, read_rasters, write_rasters
 from rail_extract.rail_extract_plugin.reading.rasters import choose_model, moved
 
 STANDARD = STANDARDS["EN_60E1_1435"]
@@ -65,29 +63,6 @@ def test_cells_keep_their_position(tmp_path, code, unit_m):
         )
 
 
-def test_file_is_a_plain_geotiff_with_one_band_per_class(tmp_path):
-    rasters = [rasterize(strokes(seed=seed), CELL_M) for seed in (1, 2)]
-    write_rasters(tmp_path / "r.tif", header_for(rasters, (10, 11), frame_in("EPSG:32643"), STANDARD), rasters)
-    dataset = gdal.Open(str(tmp_path / "r.tif"))
-    tags = {name: text for name, text in dataset.GetMetadata().items() if name.startswith("RAIL")}
-    assert tags == {"RAIL_GAUGE_MM": "1435", "RAIL_HEAD_MM": "72", "RAIL_MODEL": "fast"}
-    assert [dataset.GetRasterBand(number).GetDescription() for number in (1, 2)] == ["10", "11"]
-    band = dataset.GetRasterBand(2)
-    assert (band.DataType, band.GetNoDataValue(), band.GetBlockSize()) == (gdal.GDT_Byte, 0, [BLOCK, BLOCK])
-    cells = np.frombuffer(band.ReadRaster(), np.uint8)
-    assert (cells == 1).sum() == rasters[1].count() == (cells != 0).sum()
-
-
-@pytest.fixture
-def corridor(tmp_path):
-    """A diagonal of 10 km, with a bounding box of 31 gigapixels."""
-    along = np.arange(0, 10_000, 0.02)
-    raster = rasterize(np.column_stack([along, along]) / np.sqrt(2), CELL_M)
-    path = tmp_path / "corridor.tif"
-    write_rasters(path, header_for([raster], (10,), frame_in("EPSG:32643"), STANDARD), [raster])
-    return raster, path
-
-
 def test_without_an_extent_the_bounds_are_those_of_the_file(tmp_path):
     raster = rasterize(strokes(), CELL_M)
     header = header_for([raster], (10,), frame_in("EPSG:2227", 1200 / 3937), STANDARD)
@@ -97,18 +72,6 @@ def test_without_an_extent_the_bounds_are_those_of_the_file(tmp_path):
     expected = (x, y + height * dataset.RasterYSize, x + width * dataset.RasterXSize, y)
     for bounds in (header.bounds, read_header(tmp_path / "r.tif").bounds):
         np.testing.assert_allclose(bounds, expected, atol=1e-6)
-
-
-def test_empty_areas_of_a_corridor_take_no_space_and_no_time(corridor):
-    raster, path = corridor
-    header = read_header(path)
-    assert header.window[2] * header.window[3] > 31e9
-    blocks = filled_blocks(gdal.Open(str(path)), 1)
-    assert len(blocks) < 4 * 10_000 / np.sqrt(2) / (BLOCK * CELL_M)
-    assert path.stat().st_size < 4_000_000
-    (found,) = read_rasters(path, header)
-    assert found.count() == raster.count()
-    assert len(found.tiles) == len(raster.tiles)
 
 
 def test_only_rail_cells_of_a_sparse_file_are_cleaned_and_vectorized(tmp_path):
@@ -197,25 +160,6 @@ def test_model_by_name_by_tag_and_by_ratio(geotiff):
         chosen("AUTO", "1000", "61.91")
     with pytest.raises(ModelError, match="models cover"):
         chosen("AUTO", "1460", "45")
-
-
-def test_unwritable_file_is_refused(tmp_path):
-    raster = rasterize(strokes(), CELL_M)
-    header = header_for([raster], (10,), frame_in("EPSG:32643"), STANDARD)
-    with pytest.raises(OSError, match="gone"):
-        write_rasters(tmp_path / "gone" / "r.tif", header, [raster])
-
-
-def test_cancelled_writing_leaves_no_file(tmp_path):
-    class Impatient(Progress):
-        def is_cancelled(self):
-            return True
-
-    raster = rasterize(strokes(), CELL_M)
-    header = header_for([raster], (10,), frame_in("EPSG:32643"), STANDARD)
-    with pytest.raises(Cancelled), Destination.at(tmp_path / "r.tif").replacing() as new:
-        write_rasters(new, header, [raster], Impatient())
-    assert not list(tmp_path.iterdir())
 
 
 def test_limit_counts_blocks(monkeypatch):

@@ -60,31 +60,6 @@ def reasons_without(tmp_path):
     return run
 
 
-@pytest.fixture
-def without_laspy(monkeypatch):
-    find_spec = dependencies.find_spec
-    monkeypatch.setattr(dependencies, "find_spec", lambda name: None if name == "laspy" else find_spec(name))
-
-
-def test_algorithm_can_run_here(algorithm):
-    assert algorithm.canExecute() == (True, "")
-
-
-def test_missing_package_is_named_with_its_remedy(algorithm, without_laspy):
-    executable, reason = algorithm.canExecute()
-    assert not executable
-    assert reason.startswith("Extract rails needs the Python package laspy, which this QGIS does not have: run Install")
-    assert "qgis_process run railextract:installpackages" in reason
-    assert reason.endswith("Build track centerlines and Clean rail raster (FRPDF) work without it.")
-
-
-def test_missing_package_stops_a_run_at_its_start(algorithm, context, new_feedback, without_laspy, tmp_path):
-    feedback = new_feedback()
-    results, ok = algorithm.run({"INPUT": str(tmp_path)}, context, feedback)
-    assert not ok
-    assert feedback.errors[0].startswith("Extract rails needs the Python package laspy")
-
-
 def test_wording_depends_on_the_number_of_packages_and_algorithms():
     reason = explain_missing("This", PACKAGES[-2:], ["One", "Two", "Three"])
     assert "needs the Python packages pyproj, torch, which" in reason
@@ -118,18 +93,3 @@ def test_toolbox_loads_without_any_package(reasons_without):
     assert set(reasons) == {algorithm.NAME for algorithm in ALGORITHMS}
     assert {name for name, reason in reasons.items() if not reason} == {"installpackages", "checkinstallation"}
     assert "numpy, scipy, laspy, lazrs, cv2, pyproj" in reasons["extractrails"]
-
-
-def test_message_lists_algorithms_that_work_without_laspy(reasons_without):
-    reasons = reasons_without("laspy", "lazrs")
-    assert "Python packages laspy, lazrs, which" in reasons["extractrails"]
-    assert "Clean rail raster (FRPDF)" in reasons["extractrails"]
-    assert not reasons["frpdfcleanup"]
-    assert not reasons["buildtrackcenterlines"]
-
-
-@pytest.mark.parametrize(("absent", "able"), [(["torch"], True), (["cv2", "torch"], False)])
-def test_one_engine_is_enough(reasons_without, absent, able):
-    reasons = reasons_without(*absent)
-    assert bool(reasons["frpdfcleanup"]) != able
-    assert bool(reasons["extractrails"]) != able

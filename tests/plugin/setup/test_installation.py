@@ -269,5 +269,5 @@ def test_failure_of_pytorch_lists_what_was_installed_before(add_wheel, folder, m
     with pytest.raises(
         RailExtractError, match=r"could not install torch .* No files were kept\. Already installed: railone 1\.0\.$"
     ):
-        InstallPackages().compute(Job({"railone": "railone"}, "CPU"), {}, None, SILENT)
+        InstallPackages().compute(Job({"railone": "railone"}, "CPU"), None, SILENT)
     assert (folder / "railone.py").exists()

@@ -1,7 +1,5 @@
 """DXF and CSV as GDAL, and with it QGIS, reads them."""
 
-import csv
-
 import numpy as np
 import pytest
 from lines import read_lines
@@ -42,32 +40,6 @@ def test_gdal_reads_3d_polylines_from_dxf(written, tmp_path):
         dataset = ogr.Open(str(paths[name]))
         kinds = {(feature["Layer"], feature.GetGeometryRef().GetGeometryType()) for feature in dataset.GetLayer(0)}
         assert kinds == {(layer, kind)}
-
-
-def test_gdal_reads_geometry_fields_and_system_from_csv(written, tmp_path):
-    path = tmp_path / "rails.csv"
-    _, expected = written(RAILS=path)
-    dataset = ogr.Open(str(path))
-    layer = dataset.GetLayer(0)
-    for feature, line in zip(layer, expected):
-        np.testing.assert_allclose(feature.GetGeometryRef().GetPoints(), line, atol=0.51e-4)
-        assert isinstance(feature["rail_id"], int) and isinstance(feature["sigma_mm"], float)
-    assert layer.GetFeatureCount() == len(expected) == 2
-
-
-def test_vertices_have_chainage(written, tmp_path):
-    path = tmp_path / "rails_points.csv"
-    _, expected = written(RAILS=path)
-    rows = list(csv.DictReader(path.open(encoding="utf-8")))
-    for number, line in enumerate(expected, start=1):
-        mine = [
-            [float(row[axis]) for axis in ("x", "y", "z", "chainage_m")]
-            for row in rows
-            if row["rail_id"] == str(number)
-        ]
-        np.testing.assert_allclose(np.array(mine)[:, :3], line, atol=0.51e-4)
-        assert mine[0][3] == 0
-        assert mine[-1][3] == pytest.approx(12, abs=0.1)
 
 
 def test_files_are_loaded_on_demand_and_replaced_whole(written, context, tmp_path):

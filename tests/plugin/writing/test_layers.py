@@ -3,10 +3,7 @@ import pytest
 from qgis.core import (
     NULL,
     QgsProcessing,
-    QgsProcessingOutputLayerDefinition,
     QgsProcessingUtils,
-    QgsProperty,
-    QgsUnitTypes,
     QgsVectorLayer,
     QgsWkbTypes,
 )
@@ -59,19 +56,6 @@ def test_shapefiles_keep_the_field_names(qgis, columns):
     assert max(map(len, fields(columns).names())) <= 10
 
 
-@ALL_FIELDS
-def test_fields_have_their_types(qgis, columns):
-    layer = QgsVectorLayer("LineStringZ", "lines", "memory")
-    assert layer.dataProvider().addAttributes(fields(columns).toList())
-    found = layer.dataProvider().fields()
-    assert {column.name for column in columns if not found.field(column.name).isNumeric()} <= {
-        "left_ids",
-        "right_ids",
-        "track_ids",
-        "gaps",
-    }
-
-
 @pytest.mark.parametrize("suffix", [".gpkg", ".shp", ".geojson", ".csv"])
 def test_numbers_have_the_decimals_of_their_fields(tmp_path, context, suffix):
     line = Centerline(XYZ, 1, 10, (1, 4), (2,), 1435.2189, 1 / 3, -20.04, -0.01, 123456.789)
@@ -96,36 +80,6 @@ def test_numbers_have_the_decimals_of_their_fields(tmp_path, context, suffix):
     assert all(len(digits[column.name].partition(".")[2]) <= column.decimals for column in COLUMNS), shown
 
 
-def test_unknown_coordinate_system_is_cartesian_metres(qgis):
-    crs = output_crs(None)
-    assert crs.isValid()
-    assert not crs.isGeographic()
-    assert crs.mapUnits() == QgsUnitTypes.DistanceUnit.DistanceMeters
-
-
 @pytest.mark.parametrize("value", [None, "", "memory:", QgsProcessing.TEMPORARY_OUTPUT])
 def test_outputs_that_are_not_files_are_accepted(context, value):
     assert destinations({"RAILS": value}, context) == {}
-
-
-def as_text(path):
-    return str(path)
-
-
-def as_table(path):
-    return f"ogr:dbname='{path}' table=\"rails\" (geom)"
-
-
-def as_definition(path):
-    return QgsProcessingOutputLayerDefinition(str(path))
-
-
-def as_property(path):
-    return QgsProperty.fromValue(str(path))
-
-
-@pytest.mark.parametrize("form", [as_text, as_table, as_definition, as_property])
-def test_writable_output(tmp_path, context, form):
-    found = destinations({"RAILS": form(tmp_path / "räils 1.gpkg")}, context)
-    assert found["RAILS"].file == tmp_path / "räils 1.gpkg"
-    assert not list(tmp_path.iterdir())
