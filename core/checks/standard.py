@@ -13,7 +13,7 @@ from ..classify.settings import Settings
 from ..classify.square import classify_square
 from ..clouds.points import Request
 from ..errors import CloudError, ParameterError
-from ..heads.edgeless import blunt_share
+from ..heads.head_points import near_lines
 from ..heads.roads import MIN_WIDER_M
 from ..heads.sections import likelier_width
 from ..parameters import Parameters
@@ -27,9 +27,6 @@ from .gauge_estimate import Spacings, measure_spacings
 
 SAMPLE_M = 50.0
 """Half the side of the area whose points show the width of the heads."""
-
-MOST = 0.5
-"""Share of the length of rail that shows blunt heads from which those of the cloud are blunt."""
 
 TABLES_DIFFER_M = 0.002
 """By which tables state different widths of one head, and worn heads differ: no measurement tells standards apart that
@@ -212,7 +209,7 @@ def head_widths(
     measured = measure_spacings(_middle(xyz)).most_common()
     lines = [rail.xyz[:, :2] - points.frame.shift_to(source.frame)[:2] for rail in rails]
     stated_m = gauges[0][1] if measured is None else width_at(measured[0], gauges)
-    if blunt_share(lines, xyz, stated_m) > MOST:
+    if any(points.is_blunt for points in near_lines(lines, xyz, stated_m)):
         progress.warning(
             f"Heads are blunt: the points show round ridges without edges where heads of {1000 * stated_m:.0f} mm are, "
             "as matched images and wide beams do. Lines follow the crests, and sigma_mm and sigmaz_mm state how far "

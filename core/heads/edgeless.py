@@ -7,13 +7,12 @@ ridge, which is a parabola across; its crest is the axis. See docs/method.md sec
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from .head_points import MIN_ON_HEAD, HeadPoints, near_lines
+from .head_points import MIN_ON_HEAD, HeadPoints
 from .level import OFF_TOP_SIGMAS, SLOPE_ROUNDS, robust_sigma, rough_level
 from .outline import FACE_DEPTH_M, Grid, Outline, fit_section, log_likelihood
 
@@ -123,7 +122,7 @@ class Ridge:
     @classmethod
     def find(cls, points: HeadPoints) -> Ridge | None:
         """Fit one parabola, and a crest for each window, to the points of a line; None if its head is not blunt."""
-        if not points.is_blended:
+        if not points.is_blunt:
             return None
         near = points[points.within(REACH_HEADS)]
         row, rows = near.station, len(near.stations)
@@ -158,12 +157,3 @@ def _crests(
     product = xy - mean * sy - level * sx + points * mean * level + own_prior * bend * mean
     crest = product / (bend * np.maximum(spread, 1e-12))
     return level - slope * mean, slope, crest, spread * (bend / noise_m) ** 2
-
-
-def blunt_share(lines: Sequence[np.ndarray], xyz: np.ndarray, head_width_m: float) -> float:
-    """Return the share of the length of lines, (k, 2) each, along which points, (n, 3), show blunt heads."""
-    shown_m = np.zeros(2)
-    for points in near_lines(lines, xyz, head_width_m):
-        if len(points.t):
-            shown_m[int(points.is_blended)] += np.ptp(points.t)
-    return float(shown_m[1] / max(shown_m.sum(), 1e-9))

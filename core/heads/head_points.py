@@ -96,6 +96,8 @@ class HeadPoints:
         Where the right and the left edge of the head are free of other heads; see `free_edges`.
     strips : (n,) int array or None
         See `RailPoints`.
+    is_blunt : bool
+        Whether the cloud blunts heads: all or none, for one line alone, a centimetre off its head, may look otherwise.
     """
 
     t: np.ndarray
@@ -105,6 +107,7 @@ class HeadPoints:
     line: np.ndarray
     free: np.ndarray
     strips: np.ndarray | None = None
+    is_blunt: bool = False
 
     def __getitem__(self, which: np.ndarray) -> HeadPoints:
         strips = None if self.strips is None else self.strips[which]
@@ -138,8 +141,8 @@ class HeadPoints:
         """Return which points are this close to the line, in head widths, (n,) bool."""
         return np.abs(self.across) <= share * self.width_m
 
-    @cached_property
-    def is_blended(self) -> bool:
+    @property
+    def looks_blunt(self) -> bool:
         """Whether heights fall from the crown to both sides, so that the head has no edges that could be seen.
 
         Beams from the air show this on the rims of the head, dense matching of photographs on shoulders beyond them.
@@ -242,7 +245,17 @@ def near_lines(
         mine = slice(*np.searchsorted(feet.line, [number, number + 1]))
         strip = None if own is None else own[mine]
         heads.append(HeadPoints(feet.t[mine], feet.across[mine], z[mine], width_m, lines[number], free[number], strip))
-    return heads
+    is_blunt = _are_blunt(heads)
+    return [replace(head, is_blunt=is_blunt) for head in heads]
+
+
+def _are_blunt(heads: Sequence[HeadPoints]) -> bool:
+    """Return whether most of the length of lines shows blunt heads."""
+    shown_m = np.zeros(2)
+    for points in heads:
+        if len(points.t):
+            shown_m[int(points.looks_blunt)] += np.ptp(points.t)
+    return bool(shown_m[1] > shown_m[0])
 
 
 def free_edges(lines: Sequence[np.ndarray], head_width_m: float) -> list[np.ndarray]:

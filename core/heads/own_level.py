@@ -86,7 +86,7 @@ def on_own_level(points: HeadPoints) -> HeadPoints:
     """
     t, head = points.t, points.within(0.5)
     occupied = len(np.unique((t[head] / LEVEL_BIN_M).astype(int)))
-    if head.sum() < max(MIN_ON_HEAD, MIN_IN_BIN * occupied) or points.is_blended:
+    if head.sum() < max(MIN_ON_HEAD, MIN_IN_BIN * occupied) or points.is_blunt:
         return points
     flat = points.z - _gradient(t[head], points.z[head], t)
     number = (t / LEVEL_BIN_M).astype(int)

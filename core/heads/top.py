@@ -161,7 +161,7 @@ def fit_crown(points: HeadPoints) -> Crown:
     near = points[points.within(RIM_HEADS[0])]
     if not len(near.t):
         return Crown(usual, usual, rim_m)
-    expected = np.array([0.0, 0.0, 0.0 if points.is_blended else usual**-2])
+    expected = np.array([0.0, 0.0, 0.0 if points.is_blunt else usual**-2])
     above, powers = near.z - rough_level(near.t, near.z), np.vander(near.across, 3, increasing=True)
     used, off = np.ones(len(above), dtype=bool), above
     for _ in range(SLOPE_ROUNDS):

@@ -8,7 +8,7 @@ WIDTH, LENGTH_M, BEND = 0.072, 40.0, 8.0
 
 def ridge_of(t, across, z):
     line, free = np.array([[0.0, 0.0], [LENGTH_M, 0.0]]), np.ones((2, len(stations_along(LENGTH_M))), dtype=bool)
-    return Ridge.find(HeadPoints(t, across, z, WIDTH, line, free))
+    return Ridge.find(HeadPoints(t, across, z, WIDTH, line, free, is_blunt=True))
 
 
 def ridge_points(offset_m=0.0, noise_m=0.015, slope=0.0, per_m=40, seed=0):
