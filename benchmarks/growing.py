@@ -12,7 +12,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from rail_extract.core.grow.growth import Growth, Rail, grow
+from rail_extract.core.grow.growth import Growth, grow
+from rail_extract.core.grow.heads import Rail
 from rail_extract.core.grow.settings import GrowSettings
 from rail_extract.core.polyline import interpolate, length_along, project
 from rail_extract.laboratory.ruler.classification import truth

@@ -11,32 +11,9 @@ from ..polyline import length_along, runs
 from ..progress import SILENT, Progress
 from .course import smoothed
 from .follow import Reason, Window, follow, turned
-from .heads import OnHeads
-from .settings import Beam, GrowSettings
+from .heads import OnHeads, Rail
+from .settings import GrowSettings
 from .start import Start, find_start
-
-
-@dataclass(frozen=True)
-class Rail:
-    """A rail that was followed.
-
-    Attributes
-    ----------
-    xyz : (k, 3) array
-        Its axis on the top of the head, a place for each window from the first one in which it was seen to the last.
-    seen : (k,) bool array
-        Windows in which it was seen.
-    beam : Beam
-    """
-
-    xyz: np.ndarray
-    seen: np.ndarray
-    beam: Beam
-
-    @property
-    def length_m(self) -> float:
-        """Length in plan."""
-        return float(length_along(self.xyz[:, :2])[-1])
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -13,9 +12,6 @@ from ..classify.flush import BESIDE_M, HEAD_LEVEL_M
 from ..classify.square import classify_square
 from ..polyline import Feet, length_along, project
 from .settings import BLUNT, DENSE, THIN, Beam, GrowSettings
-
-if TYPE_CHECKING:
-    from .growth import Rail
 
 Key = tuple[int, int]
 
@@ -46,6 +42,29 @@ class Head:
     top_m: float
     count: int
     alone: bool
+
+
+@dataclass(frozen=True)
+class Rail:
+    """A rail that was followed.
+
+    Attributes
+    ----------
+    xyz : (k, 3) array
+        Its axis on the top of the head, a place for each window from the first one in which it was seen to the last.
+    seen : (k,) bool array
+        Windows in which it was seen.
+    beam : Beam
+    """
+
+    xyz: np.ndarray
+    seen: np.ndarray
+    beam: Beam
+
+    @property
+    def length_m(self) -> float:
+        """Length in plan."""
+        return float(length_along(self.xyz[:, :2])[-1])
 
 
 def heads_in(

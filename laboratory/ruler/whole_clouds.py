@@ -8,8 +8,7 @@ import numpy as np
 
 from ...core.classify.settings import MARGIN_M, Settings
 from ...core.classify.square import Classified
-from ...core.grow.growth import Rail
-from ...core.grow.heads import OnHeads
+from ...core.grow.heads import OnHeads, Rail
 from ...core.grow.settings import GrowSettings
 from ...core.labelling.finding import search_square
 from ...core.progress import SILENT, Progress
