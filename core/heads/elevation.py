@@ -13,7 +13,6 @@ import numpy as np
 
 from ..clouds.points import RailPoints
 from ..lines.network import LineNetwork
-from ..lines.smoothing import STATIONS_PER_SIGMA
 from ..parameters import Parameters
 from ..polyline import interpolate, length_along, project, resample, starts_at_its_end
 from ..progress import SILENT, Progress
@@ -225,11 +224,10 @@ def measure_again(
     rails: Sequence[RailLine],
     points: RailPoints,
     head_width_m: Widths,
-    smoothing_z_m: float | None,
     progress: Progress = SILENT,
     align: bool = False,
 ) -> list[RailLine]:
-    """Measure heights, with another smoothing, and the support of finished rails, which may come from files.
+    """Measure heights, as far as the points show them, and the support of finished rails, which may come from files.
 
     Parameters
     ----------
@@ -237,8 +235,6 @@ def measure_again(
     points : RailPoints
     head_width_m : float or (n,) array
         Width of the heads, of all rails or of each.
-    smoothing_z_m : float or None
-        See `Parameters`.
     progress : Progress
     align : bool
         See `ElevationParameters`.
@@ -248,13 +244,12 @@ def measure_again(
     list of RailLine
         In the order given. A rail without points keeps its heights and is a gap from end to end.
     """
-    step_m = KNOT_M if smoothing_z_m is None else smoothing_z_m / STATIONS_PER_SIGMA
-    plans = [resample(rail.xyz[:, :2], step_m)[0] for rail in rails]
+    plans = [resample(rail.xyz[:, :2], KNOT_M)[0] for rail in rails]
     near = near_lines(plans, points.xyz, head_width_m, points.strips, progress.span(0.0, 0.7))
     measured = []
     for rail, head in zip(rails, progress.span(0.7, 1.0).follow(near)):
         # Lines from a file are only known to be on their heads, so the head width takes the place of the cell size.
-        parameters = ElevationParameters(smoothing_z_m=smoothing_z_m, cell_m=head.width_m, align=align)
+        parameters = ElevationParameters(cell_m=head.width_m, align=align)
         again = _measured(head, NO_FREE_ENDS, parameters, measure_strips(head))
         if again is None:
             measured.append(_unsupported(rail, head.width_m))

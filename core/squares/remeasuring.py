@@ -20,8 +20,8 @@ from ..tracks.geometry import PROFILE_SIGMA_M
 from .grid import Key, PointSource, Square, lay_out, unique_keys
 
 CONTEXT_M = 10.0
-"""Distance beyond a square over which its rails are measured as well: the disc reaches 1 m, the smoothing of heights
-over 1 m at most 3 m, and that of the lateral figures 2.4 m."""
+"""Distance beyond a square over which its rails are measured as well: the disc reaches 1 m, and what is further away moves
+a smoothed height by a third of its standard error, and by half of it where heads are blunt."""
 
 LOOKUP_STEP_M = 1.0
 """Spacing of the stations whose square is looked up."""
@@ -93,7 +93,7 @@ def _measure(
 ) -> tuple[RailLine, ...]:
     """Measure the rails of a square, in its frame; a task."""
     points = source.near(square, CONTEXT_M)
-    return tuple(measure_again(rails, points, widths_m, PROFILE_SIGMA_M, context.progress, align))
+    return tuple(measure_again(rails, points, widths_m, context.progress, align))
 
 
 def _with_context(rail: RailLine, section: Section, square: Square, source: PointSource) -> RailLine:

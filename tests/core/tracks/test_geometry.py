@@ -15,7 +15,7 @@ from rail_extract.core.rails import NO_GAPS, Centerline, RailLine, Support
 from rail_extract.core.raster import cell_size, rasterize
 from rail_extract.core.squares import steps
 from rail_extract.core.tracks.centerlines import build_centerlines
-from rail_extract.core.tracks.geometry import PROFILE_SIGMA_M, measure_track_geometry
+from rail_extract.core.tracks.geometry import measure_track_geometry
 from rail_extract.core.vectorize import vectorize
 from rail_extract.laboratory.curves import Element, trace, transition_curve
 from rail_extract.laboratory.scenes.scanner import Scanner, scan
@@ -88,7 +88,7 @@ def test_a_scanned_track_is_measured_to_millimetres(stored):
     if stored:
         rails, lines = thin(rails, 0.002, 0.002), thin(lines, 0.002, 0.002)
         rails = [replace(rail, support=None, gaps=NO_GAPS) for rail in rails]
-    (found,) = measure_track_geometry(lines, measure_again(rails, points, WIDTH, PROFILE_SIGMA_M), WIDTH)
+    (found,) = measure_track_geometry(lines, measure_again(rails, points, WIDTH), WIDTH)
     t = found.chainage_m
     assert rms(found.gauge_mm - 1435.0) < 2.0
     assert rms(found.cant_mm - ramp(t, -CANT_MM)) < 1.0
