@@ -20,8 +20,8 @@ from ..tracks.geometry import PROFILE_SIGMA_M
 from .grid import Key, PointSource, Square, lay_out, unique_keys
 
 CONTEXT_M = 10.0
-"""Distance beyond a square over which its rails are measured as well: the disc reaches 1 m, and what is further away moves
-a smoothed height by a third of its standard error, and by half of it where heads are blunt."""
+"""Distance beyond a square over which its rails are measured as well: the disc reaches 1 m, and what is further away
+moves a smoothed height by a third of its standard error, and by half of it where heads are blunt."""
 
 LOOKUP_STEP_M = 1.0
 """Spacing of the stations whose square is looked up."""
