@@ -42,8 +42,7 @@ STEPS = (
     "smooth_network",
     "refine",
     "elevate",
-    "thin",
-    "build_centerlines",
+    "finished",
 )
 PARTS = ("stages", "network", "changes", "calls")
 
@@ -113,9 +112,10 @@ def stages(clock, model: str, engine: str) -> tuple[dict[str, float], str]:
     clouds = timed("read_rail_points", read_rail_points)(SAMPLE, [10])
     for name in STEPS:
         setattr(steps, name, timed(name, getattr(steps, name)))
+    pipeline.tracks_of = timed("tracks_of", pipeline.tracks_of)
     parameters = pipeline.Parameters(standard.gauge_m, standard.head_width_m, model=model, engine=engine)
     network = timed("whole walk", pipeline.extract_rails)(clouds, parameters)
-    named = sum(spent[name] for name in STEPS)
+    named = sum(spent[name] for name in (*STEPS, "tracks_of"))
     spent["joining and all else"] = spent.pop("whole walk") - named
     return dict(spent), network.engine
 
