@@ -177,7 +177,7 @@ def _touch(from_end: np.ndarray, line: np.ndarray) -> tuple[int, Bridge] | None:
         return None
     onward = way[int(np.abs(x - touch_m).argmin())]
     stock = line[onward:] if way[0] < way[-1] else line[onward::-1]
-    curve = bridge(from_end, stock) if length_along(stock)[-1] >= DIRECTION_M else None
+    curve = bridge(from_end, stock, misfit_m=KNOWN_MISFIT_M) if length_along(stock)[-1] >= DIRECTION_M else None
     if curve is None:
         return None
     further = int(np.searchsorted(length_along(stock), curve.cuts_m[1]))
