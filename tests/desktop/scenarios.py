@@ -58,8 +58,8 @@ PART = {
 }
 """Parameters for 20 m of the sample's three tracks, for runs of a second or two."""
 
-ON_RAIL, BESIDE = QgsPointXY(578250.91, 2494323.23), QgsPointXY(578250.91, 2494323.78)
-"""A place on a rail of the sample, from which a click may be 0.1 m off, and one half a gauge away."""
+ON_RAIL, BESIDE = QgsPointXY(500006.0, 3000000.754), QgsPointXY(500006.0, 3000000.0)
+"""A place on a rail of the raw cloud, from which a click may be 0.1 m off, and one half a gauge away."""
 
 POOL_S = 35.0
 """Time after which Qt has ended the thread of a run: 30 s without work, and some more."""
@@ -597,14 +597,14 @@ def growing(driver: Driver) -> Iterator:
     menu = next(one for one in iface.pluginMenu().actions() if one.text() == "Rail Extract").menu()
     next(one for one in menu.actions() if one.text() == "Grow Rails").trigger()
     tool = plugins["rail_extract"].windows.growing
-    tool.standards.setCurrentIndex(tool.standards.findData(PART["STANDARD"]))
+    tool.standards.setCurrentIndex(tool.standards.findData("EN_60E1_1435"))
     yield from _click(BESIDE)
     chooser = yield lambda: window("QFileDialog")
-    yield from _answer(chooser, SAMPLE)
+    yield from _answer(chooser, RAW)
     yield lambda: tool.message and not tool.is_growing
     driver.keep("said beside", tool.message)
     driver.picture("grow_missed")
-    layer = QgsPointCloudLayer(SAMPLE, "sample", "pdal")  # invalid in a QGIS without PDAL
+    layer = QgsPointCloudLayer(RAW, "raw", "pdal")  # invalid in a QGIS without PDAL
     layer.setCrs(system)
     iface.setActiveLayer(QgsProject.instance().addMapLayer(layer))
     for _ in range(2):
@@ -626,7 +626,7 @@ def growing(driver: Driver) -> Iterator:
     driver.keep("standard", values["STANDARD"])
     driver.picture("grow_dialog")
     classified = str(driver.folder / "classified.las")
-    dialog.setParameters({**values, "INPUT": SAMPLE, "RAIL_CLASS": 20, "OUTPUT": classified})
+    dialog.setParameters({**values, "INPUT": RAW, "RAIL_CLASS": 20, "OUTPUT": classified})
     driver.keep("log", (yield from press_run(dialog)))
     driver.keep("results", dialog.results())
     yield from close(dialog)
