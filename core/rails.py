@@ -405,6 +405,9 @@ class SearchFigures:
         Length of rails where the blur of the cloud hides how wide a head is.
     blur_m2 : float
         The blur there, a standard deviation, times this length.
+    sharp_m, round_m : float
+        Length of the rails with a partner that are as narrow as a head, and of those that are wider and round, before
+        the cloud is known to be blunt; see `classify.sharpness`.
     """
 
     points: int = 0
@@ -418,6 +421,8 @@ class SearchFigures:
     across_m: float = 0.0
     blunt_m: float = 0.0
     blur_m2: float = 0.0
+    sharp_m: float = 0.0
+    round_m: float = 0.0
 
     def __add__(self, other: SearchFigures) -> SearchFigures:
         return SearchFigures(*(one + more for one, more in zip(astuple(self), astuple(other))))

@@ -86,12 +86,7 @@ def detect_in_raw(request: Request, progress: Progress = SILENT) -> RailStandard
     best_m, found = 0.0, np.empty((0, 3))
     for gauge_m, share in zip(_plausible_gauges(), progress.split(len(_plausible_gauges()))):
         paired_m, rails = 0.0, [np.empty((0, 3))]
-        for number in share.follow(fullest):
-            mine = xyz[square.ravel() == number]
-            corner = np.array([*keys[number] * RAW_SQUARE_M, 0.0])
-            classified = classify_square(mine - corner, Settings((gauge_m,), RAW_HEAD_M))
-            paired_m += classified.figures.paired_m
-            rails.append(mine[classified.rail])
+        for classified, mine in search_alike(share.follow(fullest), partial(search, Settings((gauge_m,), RAW_HEAD_M)):
         if paired_m > best_m:
             best_m, found = paired_m, np.concatenate(rails)
     return _detected(measure_spacings(found), progress)

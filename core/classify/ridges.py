@@ -104,10 +104,6 @@ class Ridges:
         below = np.cumsum(self.length_m[order])
         return float(self.spread_m[order[np.searchsorted(below, BLUR_QUANTILE * below[-1])]])
 
-    def are_blunt(self, head_width_m: float) -> bool:
-        """Return whether the blur hides how wide a head is."""
-        return self.blur_m > head_width_m / 2
-
     def may_be_heads(self, head_width_m: float) -> np.ndarray:
         """Return which ridges are not wider than a head with the blur of the square, (pieces,) bool."""
         blurred_m = WIDTH_PER_SIGMA * np.hypot(head_width_m / np.sqrt(12), self.blur_m)

@@ -47,10 +47,6 @@ class Tolerances:
     wider_m, wider_single_m : float
         Width beyond that of a head up to which the top of a piece may be one, with a partner and without. Measured: up
         to 8 mm, and 42 mm on thin clouds; kerbs of 150 mm 42 mm, on thin clouds 63 mm.
-    sharp_m, sharp_share : float
-        Width beyond that of a head up to which a top is not blurred, and the share of such cells, among those with a
-        partner, below which the blur of the square is measured. Wide beams blend heads with the ballast, and `THIN`
-        allows for that; in a dense square, one wide top is enough.
     """
 
     along_m: float
@@ -64,8 +60,6 @@ class Tolerances:
     band: Band
     wider_m: float
     wider_single_m: float
-    sharp_m: float
-    sharp_share: float
 
 
 HEADS = Band(low_m=LOW_M, depth_share=1.0, slab_m=0.025)
@@ -85,8 +79,6 @@ DENSE = Tolerances(
     band=HEADS,
     wider_m=0.025,
     wider_single_m=0.012,
-    sharp_m=0.012,
-    sharp_share=1.0,
 )
 """For scanners on vehicles: beams of a few millimetres, range noise up to 5 mm."""
 
@@ -102,8 +94,6 @@ THIN = Tolerances(
     band=HEADS,
     wider_m=0.05,
     wider_single_m=0.04,
-    sharp_m=0.05,
-    sharp_share=0.5,
 )
 """For scanners in the air: a beam of 4 to 9 cm blends the head and the ballast."""
 
@@ -130,6 +120,8 @@ class Settings:
         Weights of a network that was trained on labelled clouds and replaces the geometry; see `learned`.
     low_m : float
         Least height of a rail above the bed, unless it is in a pavement or blunt.
+    blunt : bool
+        Whether the cloud blurs heads to round ridges; see `sharpness`.
     """
 
     gauges_m: tuple[float, ...]
@@ -138,6 +130,7 @@ class Settings:
     guide: Guide | None = None
     weights: Path | None = None
     low_m: float = LOW_M
+    blunt: bool = False
 
     @property
     def cell_m(self) -> float:

@@ -203,66 +203,91 @@ class Standing:
         Whether the square is thin.
     rails : Kept
         Those that the guide leaves out as well.
+    sharp_m, round_m : float
+        See `SearchFigures`.
     blur_m : float
-        Blur of the square if it hides how wide a head is; otherwise 0.
+        Blur of the ridges of a blunt cloud.
     """
 
     points: np.ndarray
     kept: Kept
     thin: bool
     rails: Kept
-    blur_m: float
+    sharp_m: float = 0.0
+    round_m: float = 0.0
+    blur_m: float = 0.0
 
 
 def _standing(shown: Shown, settings: Settings) -> Standing:
-    """Find rails that stand out of their bed."""
-    found = Candidates.find(shown, replace(HEADS, low_m=settings.low_m))
+    """Find rails that stand out of their bed: bars as narrow as a head, or the ridges of a blunt cloud."""
+    band = BLUNT.band if settings.blunt else replace(HEADS, low_m=settings.low_m)
+    found = Candidates.find(shown, band)
     density = _density(shown.bed.coarse, shown.tops.grid.middles(found.marks))
-    tolerances = THIN if density < THIN_PER_M2 else DENSE
-    reach_m = reach_at(density)
-    kept = _kept(found, reach_m, tolerances, settings)
+    thin = density < THIN_PER_M2
+    tolerances = BLUNT if settings.blunt else THIN if thin else DENSE
+    kept = _kept(found, reach_at(density), tolerances, settings)
+    if settings.blunt:
+        return _on_ridges(kept, thin, shown, settings)
+    return _on_bars(kept, thin, found, shown, settings, tolerances)
+
+
+def _on_bars(
+    kept: Kept, thin: bool, found: Candidates, shown: Shown, settings: Settings, tolerances: Tolerances
+) -> Standing:
+    """Keep the cells of pieces that are as narrow as a head."""
     heads = whole_heads(shown.tops, _completed(found, kept, settings, tolerances), tolerances)
     chosen = label(shown.tops, heads, shown.cell, shown.height, tolerances)
     beside = Near.find(shown.xy[chosen], kept.lines)
-    narrow, blur_m = _narrow(kept, beside, shown, settings, tolerances)
-    if blur_m:
-        kept, chosen = _blunt_heads(shown, reach_m, settings)
-        beside, narrow = Near.find(shown.xy[chosen], kept.lines), np.ones(len(kept.cell), dtype=bool)
-    wanted = narrow.copy()
-    if settings.guide is not None:
-        wanted &= settings.guide.keeps(kept.lines, kept.pairs, settings.spacings_m, tolerances.partner_m)
-    on = beside.on(settings.head_width_m / 2 + tolerances.beside_m, wanted[beside.cell])
-    return Standing(chosen[on], kept.of(wanted), tolerances is THIN, kept.of(narrow), blur_m)
+    narrow, sharp, rounded = _widths(kept, beside, shown, settings, tolerances)
+    standing = _wanted(kept, narrow, chosen, beside, thin, settings, tolerances)
+    share_m = _share_m(kept, settings)
+    return replace(standing, sharp_m=float(share_m[sharp].sum()), round_m=float(share_m[rounded].sum()))
 
 
-def _blunt_heads(shown: Shown, reach_m: float, settings: Settings) -> tuple[Kept, np.ndarray]:
-    """Find heads that are blurred to round ridges.
+def _on_ridges(kept: Kept, thin: bool, shown: Shown, settings: Settings) -> Standing:
+    """Keep the cells of ridges that may be heads, with their axes on the crests.
 
-    Returns
-    -------
-    Kept
-        Cells with their axes on the crests; all of them with a partner, because a mound of this width is as round.
-    (k,) int array
-        Numbers of the points on the heads.
+    All of them have a partner, because a mound of this width is as round.
     """
-    kept = _kept(Candidates.find(shown, BLUNT.band), reach_m, BLUNT, settings)
+    blur_m = 0.0
     if len(kept.cell):
         piece = pieces_of(len(kept.cell), kept.pairs)
         ridges = Ridges.measure(shown.xy, shown.height, kept.lines, piece)
+        blur_m = ridges.blur_m
         kept = kept.of(ridges.may_be_heads(settings.head_width_m)[piece])
         kept = replace(kept, paired=_paired(kept.lines, settings, BLUNT))
         kept = kept.of(_long(kept, settings, False, BLUNT.least_m))
-        kept = replace(kept, lines=on_crests(shown.xy, shown.height, kept.lines, ridges.blur_m))
+        kept = replace(kept, lines=on_crests(shown.xy, shown.height, kept.lines, blur_m))
     cells = cells_beside(shown.tops.grid, kept.lines, settings.head_width_m / 2 + BLUNT.beside_m)
-    return kept, label(shown.tops, cells, shown.cell, shown.height, BLUNT)
+    chosen = label(shown.tops, cells, shown.cell, shown.height, BLUNT)
+    beside = Near.find(shown.xy[chosen], kept.lines)
+    every = np.ones(len(kept.cell), dtype=bool)
+    return replace(_wanted(kept, every, chosen, beside, thin, settings, BLUNT), blur_m=blur_m)
+
+
+def _wanted(
+    kept: Kept,
+    rails: np.ndarray,
+    chosen: np.ndarray,
+    beside: Near,
+    thin: bool,
+    settings: Settings,
+    tolerances: Tolerances,
+) -> Standing:
+    """Leave out what is not a rail, (n,) bool of cells, and what the guide does not want."""
+    wanted = rails.copy()
+    if settings.guide is not None:
+        wanted &= settings.guide.keeps(kept.lines, kept.pairs, settings.spacings_m, tolerances.partner_m)
+    on = beside.on(settings.head_width_m / 2 + tolerances.beside_m, wanted[beside.cell])
+    return Standing(chosen[on], kept.of(wanted), thin, kept.of(rails))
 
 
 def _standing_figures(standing: Standing, settings: Settings) -> SearchFigures:
     """Sum up the lengths of rails that stand out of their bed, in the square without its margin."""
     kept = standing.kept
-    share_m = np.where(settings.own(kept.lines.axis), shares_of_length(kept.lines, settings.head_width_m), 0.0)
+    share_m = _share_m(kept, settings)
     along_m, across_m = beside_guide(standing.rails.lines, settings)
-    blunt_m = float(share_m.sum()) if standing.blur_m else 0.0
+    blunt_m = float(share_m.sum()) if settings.blunt else 0.0
     return SearchFigures(
         paired_m=float(share_m[kept.paired].sum()),
         single_m=float(share_m[~kept.paired].sum()),
@@ -270,7 +295,14 @@ def _standing_figures(standing: Standing, settings: Settings) -> SearchFigures:
         across_m=float(across_m),
         blunt_m=blunt_m,
         blur_m2=blunt_m * standing.blur_m,
+        sharp_m=standing.sharp_m,
+        round_m=standing.round_m,
     )
+
+
+def _share_m(kept: Kept, settings: Settings) -> np.ndarray:
+    """Return the length of rail that each cell stands for in the square without its margin, (n,) metres."""
+    return np.where(settings.own(kept.lines.axis), shares_of_length(kept.lines, settings.head_width_m), 0.0)
 
 
 def _flush_figures(flush: Flush, cell: np.ndarray, settings: Settings) -> SearchFigures:
@@ -279,6 +311,7 @@ def _flush_figures(flush: Flush, cell: np.ndarray, settings: Settings) -> Search
     along_m, across_m = beside_guide(flush.rails, settings)
     return SearchFigures(
         paired_m=float(share_m.sum()),
+        sharp_m=float(share_m.sum()),
         cells=len(np.unique(cell)),
         paved=int(len(share_m) > 0),
         along_m=float(along_m),
@@ -359,10 +392,10 @@ def _near_axes(marks: Marks, kept: Kept, settings: Settings, height_m: float) ->
     return near.on((settings.head_width_m + settings.cell_m) / 2, level)
 
 
-def _narrow(
+def _widths(
     kept: Kept, beside: Near, shown: Shown, settings: Settings, tolerances: Tolerances
-) -> tuple[np.ndarray, float]:
-    """Find the cells of pieces that are as narrow as a railhead.
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Judge the cells by the width of the tops of their pieces.
 
     Parameters
     ----------
@@ -375,25 +408,24 @@ def _narrow(
 
     Returns
     -------
-    (n,) bool array
-    blur_m : float
-        Blur of the square if rails with a partner are wider for it; otherwise 0.
+    narrow : (n,) bool array
+        Rails: as narrow as a head in a square of this density.
+    sharp, rounded : (n,) bool arrays
+        Those with a partner that are as narrow as a head in a sharp cloud, and those that are wider and round.
     """
     if not len(kept.cell):
-        return np.zeros(0, dtype=bool), 0.0
+        return (np.zeros(0, dtype=bool),) * 3
     piece = pieces_of(len(kept.cell), kept.pairs)
     width_m = beside.widths(piece)
+    partnered = with_partner(kept.pairs, kept.paired)
     narrow = width_m < settings.head_width_m + tolerances.wider_m
     alone = _stands_alone(kept, piece, width_m, shown.bed, settings, tolerances)
-    partnered = with_partner(kept.pairs, kept.paired)
-    sharp = width_m < settings.head_width_m + tolerances.sharp_m
-    wide = partnered.any() and sharp[piece[partnered]].mean() < tolerances.sharp_share
-    blur_m = 0.0
-    if wide or (alone.any() and not partnered.any()):  # where rails with a partner are sharp, the cloud is
-        ridges = Ridges.measure(shown.xy, shown.height, kept.lines, piece)
-        alone &= not ridges.are_blunt(settings.head_width_m)
-        blur_m = ridges.blur_m if wide and ridges.are_blunt(settings.head_width_m) else 0.0
-    return np.where(partnered, narrow[piece], alone[piece]), blur_m
+    sharp = partnered & (width_m < settings.head_width_m + DENSE.wider_m)[piece]
+    rounded = partnered & ~sharp
+    if rounded.any():
+        spread_m = Ridges.measure(shown.xy, shown.height, kept.lines, piece).spread_m
+        rounded &= (spread_m > settings.head_width_m / 2)[piece]
+    return np.where(partnered, narrow[piece], alone[piece]), sharp, rounded
 
 
 def _stands_alone(

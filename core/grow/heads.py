@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from ..classify.flush import BESIDE_M, HEAD_LEVEL_M
+from ..classify.sharpness import SHARP_M, is_blunt, is_decided
 from ..classify.square import classify_square
 from ..polyline import Feet, length_along, project
+from ..rails import SearchFigures
 from .settings import BLUNT, DENSE, THIN, Beam, GrowSettings
 
 Key = tuple[int, int]
@@ -114,6 +116,7 @@ class _Square:
     paved: np.ndarray
     tree: cKDTree
     beam: Beam
+    figures: SearchFigures
 
 
 class OnHeads:
@@ -124,11 +127,20 @@ class OnHeads:
     read : callable
         Returns the points, (n, 3) metres, of the square of the classification in a column and row, with its margin.
     settings : GrowSettings
+    places : (k, 2) array
+        Seeds: the rails around them show whether the cloud is sharp.
     """
 
-    def __init__(self, read: Callable[[Key], np.ndarray], settings: GrowSettings) -> None:
-        self._read, self._settings = read, settings
+    def __init__(self, read: Callable[[Key], np.ndarray], settings: GrowSettings, places: np.ndarray) -> None:
+        self._read, self._settings, self._own = read, settings, settings.classification
         self._squares: dict[Key, _Square] = {}
+        seen = SearchFigures()
+        for key in dict.fromkeys(key for place in places for key in self._keys(place, SHARP_M)):
+            if not is_decided(seen):
+                seen += self._square(key).figures
+        if is_blunt(seen):
+            self._own = replace(self._own, blunt=True)
+            self._squares.clear()
 
     def around(self, xy: np.ndarray, reach_m: float) -> np.ndarray:
         """Return the points on heads, (k, 3), up to `reach_m` to the east, west, north and south of a place, (2,)."""
@@ -137,7 +149,7 @@ class OnHeads:
 
     def all_around(self, xy: np.ndarray, reach_m: float) -> np.ndarray:
         """Return all points there, (k, 3); `reach_m` is at most the margin of a square."""
-        column, row = np.floor(xy / self._settings.classification.side_m).astype(int).tolist()
+        column, row = np.floor(xy / self._own.side_m).astype(int).tolist()
         xyz = self._read((column, row))
         return xyz[(np.abs(xyz[:, :2] - xy) <= reach_m).all(axis=1)]
 
@@ -150,8 +162,8 @@ class OnHeads:
         """Yield the squares in which points lie on rails, and the numbers of these points as they are read."""
         for key in sorted(self._squares):
             xyz = self._read(key)
-            corner = np.multiply(key, self._settings.classification.side_m)
-            own = np.flatnonzero(self._settings.classification.own(xyz[:, :2] - corner))
+            corner = np.multiply(key, self._own.side_m)
+            own = np.flatnonzero(self._own.own(xyz[:, :2] - corner))
             on = np.zeros(len(xyz), dtype=bool)
             for rail in rails:
                 on[own[self._level_with(rail, xyz[own], self._squares[key])]] = True
@@ -179,17 +191,16 @@ class OnHeads:
 
     def _keys(self, xy: np.ndarray, reach_m: float) -> list[Key]:
         """List the squares within `reach_m` of a place, (2,)."""
-        side_m = self._settings.classification.side_m
+        side_m = self._own.side_m
         low, high = (np.floor((xy + step) / side_m).astype(int).tolist() for step in (-reach_m, reach_m))
         return [(c, r) for c in range(low[0], high[0] + 1) for r in range(low[1], high[1] + 1)]
 
     def _square(self, key: Key) -> _Square:
         if key not in self._squares:
-            own = self._settings.classification
             xyz = self._read(key)
-            found = classify_square(xyz - np.append(np.multiply(key, own.side_m), 0.0), own)
+            found = classify_square(xyz - np.append(np.multiply(key, self._own.side_m), 0.0), self._own)
             number, figures = np.flatnonzero(found.rail), found.figures
-            beam = THIN if figures.thin else BLUNT if figures.blunt_m else DENSE
+            beam = THIN if figures.thin else BLUNT if self._own.blunt else DENSE
             on = xyz[number]
-            self._squares[key] = _Square(on, number, found.flush.rail[number], cKDTree(on[:, :2]), beam)
+            self._squares[key] = _Square(on, number, found.flush.rail[number], cKDTree(on[:, :2]), beam, figures)
         return self._squares[key]

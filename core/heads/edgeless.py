@@ -121,10 +121,10 @@ class Ridge:
 
     @classmethod
     def find(cls, points: HeadPoints) -> Ridge | None:
-        """Fit one parabola, and a crest for each window, to the points of a line; None if its head is not blunt."""
-        if not points.is_blunt:
-            return None
+        """Fit one parabola, and a crest for each window, to the points of a line; None if it has none or is not blunt."""
         near = points[points.within(REACH_HEADS)]
+        if not points.is_blunt or not len(near.t):
+            return None
         row, rows = near.station, len(near.stations)
         x, up = near.across, near.z - rough_level(near.t, near.z)
         used = np.ones(len(x), dtype=bool)

@@ -6,14 +6,16 @@ The files are read once; memory holds one square and its margin (docs/classifica
 from __future__ import annotations
 
 import uuid
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from ..classify.guide import MIDDLE_M, Guide
 from ..classify.settings import MARGIN_M, Settings
+from ..classify.sharpness import search_alike
 from ..classify.square import Classified, classify_square
 from ..clouds.points import Request, read_each
 from ..clouds.readers import CloudHeader, read_points, shows_scanner
@@ -98,12 +100,23 @@ def find_rail_points(
     reading, searching = progress.divide((1.0, 3.0))
     request.announce(progress)
     sorted_files = sort_files(request, settings, folder, runner, reading)
-    keys = sorted({key for one in sorted_files for key in one.counts})
-    if not keys:
+    counts: Counter[Key] = Counter()
+    for one in sorted_files:
+        counts.update(one.counts)
+    if not counts:
         raise _nothing_to_search(request, settings.guide)
     progress.status("Searching for rails")
-    tasks = {key: _search_task(key, sorted_files, request.zero, settings) for key in keys}
-    for found in in_listed_order(tasks, runner.run(tasks, searching)):
+    searched = 0
+
+    def search(keys: Sequence[Key], blunt: bool) -> Iterator[Found]:
+        nonlocal searched
+        own = replace(settings, blunt=blunt)
+        tasks = {key: _search_task(key, sorted_files, request.zero, own) for key in keys}
+        start, searched = searched, min(searched + len(keys), len(counts))
+        share = searching.span(start / len(counts), searched / len(counts))
+        yield from in_listed_order(tasks, runner.run(tasks, share))
+
+    for found in search_alike(sorted(counts, key=lambda key: (-counts[key], key)), search):
         if found.figures != SearchFigures():
             yield found
 

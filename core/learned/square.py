@@ -51,14 +51,15 @@ def label_square(
     blocks = cut(thinned, settings.side_m)
     if blocks:
         probability = _spread(thinned, classifier.probabilities(thinned, blocks, progress))
-        if by_shape.figures.blunt_m:
+        if settings.blunt:
             probability[by_shape.rail[thinned.band]] = 1.0
         found = np.flatnonzero((probability >= POSSIBLE) & settings.own(xyz[thinned.band]))
         point, sure = thinned.band[found], probability[found] >= PROBABILITY
         kept, standing = rails_of(xyz[point], sure, settings, _reach_m(thinned.coarse, point[sure]))
         rail[point[kept]] = True
         figures += replace(standing, blunt_m=by_shape.figures.blunt_m, blur_m2=by_shape.figures.blur_m2)
-    return Classified(rail, replace(figures, points=int(rail.sum()), squares=int(rail.any())))
+    shown = {name: getattr(by_shape.figures, name) for name in ("sharp_m", "round_m")}
+    return Classified(rail, replace(figures, points=int(rail.sum()), squares=int(rail.any()), **shown))
 
 
 def _reach_m(coarse: Coarse, point: np.ndarray) -> float:

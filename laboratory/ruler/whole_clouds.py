@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
 from ...core.classify.settings import MARGIN_M, Settings
+from ...core.classify.sharpness import search_alike
 from ...core.classify.square import Classified
 from ...core.grow.heads import OnHeads, Rail
 from ...core.grow.settings import GrowSettings
@@ -15,6 +18,13 @@ from ...core.progress import SILENT, Progress
 from ...core.rails import SearchFigures
 from ...core.squares.grid import Key, points_by_square, unique_keys
 from ...core.tasks import Context, Once
+
+
+class Part(NamedTuple):
+    """What was found in a square: numbers of rail points in the cloud, (k,), and figures."""
+
+    number: np.ndarray
+    figures: SearchFigures
 
 
 def classify_cloud(xyz: np.ndarray, settings: Settings, progress: Progress = SILENT) -> Classified:
@@ -35,15 +45,20 @@ def classify_cloud(xyz: np.ndarray, settings: Settings, progress: Progress = SIL
     """
     rail = np.zeros(len(xyz), dtype=bool)
     figures = SearchFigures()
-    keys, _ = unique_keys(xyz, settings.side_m)
+    keys, square = unique_keys(xyz, settings.side_m)
     context = Context({}, Once(), progress)
     around_them = points_by_square(xyz, settings.side_m, MARGIN_M)
-    for key in progress.follow(keys):
-        number = around_them[key]
-        corner = np.array([*np.multiply(key, settings.side_m), 0.0])
-        found = search_square(xyz[number] - corner, settings.at(key), context)
-        rail[number[found.rail]] = True
-        figures += found.figures
+
+    def search(some: Sequence[Key], blunt: bool) -> Iterator[Part]:
+        for key in progress.follow(some):
+            number = around_them[key]
+            corner = np.array([*np.multiply(key, settings.side_m), 0.0])
+            found = search_square(xyz[number] - corner, replace(settings.at(key), blunt=blunt), context)
+            yield Part(number[found.rail], found.figures)
+
+    for part in search_alike([keys[place] for place in np.argsort(-np.bincount(square), kind="stable")], search):
+        rail[part.number] = True
+        figures += part.figures
     return Classified(rail, figures)
 
 

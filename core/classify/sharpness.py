@@ -1,0 +1,76 @@
+"""Whether a cloud is sharp or blunt: a property of the scanner or camera, hence of the cloud and not of a square.
+
+Rails are the only things of known width. A cloud that shows some of them as narrow as their heads is sharp, whatever
+else it shows (docs/classification.md).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import Protocol, TypeVar
+
+from ..rails import SearchFigures
+
+SHARP_M = 20.0
+"""Length of rails as narrow as their heads that shows a cloud to be sharp. Measured: less than 2 m of a drone survey's
+770 m, a scanner's weeds and mixed pixels widen single metres."""
+
+BLUNT_M = 100.0
+"""Length of round rails that shows a cloud without these to be blunt; the rest of it need not be seen."""
+
+FIRST_PARTS = 4
+"""Parts of a cloud that are searched first to find out; then as many again as were searched, until enough rails are
+seen."""
+
+Part = TypeVar("Part")
+
+
+class HasFigures(Protocol):
+    """What was found in a part of a cloud."""
+
+    @property
+    def figures(self) -> SearchFigures:
+        """Its figures."""
+
+
+Answer = TypeVar("Answer", bound=HasFigures)
+
+
+def is_blunt(seen: SearchFigures) -> bool:
+    """Return whether a cloud is blunt, by the sum of the figures of parts that were searched as if it were sharp."""
+    return seen.sharp_m < min(SHARP_M, seen.round_m)
+
+
+def is_decided(seen: SearchFigures) -> bool:
+    """Return whether further parts would not change that."""
+    return seen.sharp_m >= SHARP_M or seen.round_m >= BLUNT_M
+
+
+def search_alike(
+    parts: Sequence[Part], search: Callable[[Sequence[Part], bool], Iterable[Answer]]
+) -> Iterator[Answer]:
+    """Search all parts of a cloud in the way that suits it.
+
+    Parameters
+    ----------
+    parts : sequence
+        Those that show most first.
+    search : callable
+        Searches parts of a sharp cloud, or of a blunt one.
+
+    Yields
+    ------
+    Answer
+        For each part.
+    """
+    seen, done, found = SearchFigures(), 0, []
+    while done < len(parts) and not is_decided(seen):
+        batch = parts[done : done + max(done, FIRST_PARTS)]
+        answers = list(search(batch, False))
+        seen = sum((answer.figures for answer in answers), seen)
+        done, found = done + len(batch), found + answers
+    if is_blunt(seen):
+        yield from search(parts, True)
+    else:
+        yield from found
+        yield from search(parts[done:], False)
