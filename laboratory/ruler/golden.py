@@ -23,11 +23,12 @@ from ..scenes.layouts import LAYOUTS
 from ..scenes.raw import RawScene
 from ..scenes.raw_catalogue import AIR, RAW_SCENES
 from ..scenes.scene import Scene
+from ..scenes.whole_rails import WHOLE
 from .classification import score
 from .lines import Match, match
 from .measuring import QUALITY_STEP_M, local_sigma
 
-DRAWN: dict[str, Callable[..., Scene]] = {**SCENES, **ADVERSARIAL, **LAYOUTS}
+DRAWN: dict[str, Callable[..., Scene]] = {**SCENES, **ADVERSARIAL, **LAYOUTS, **WHOLE}
 """Scenes of classified points, by name."""
 
 RAW_SEED = 2026
@@ -43,6 +44,7 @@ QUICK = (
     *("straight", "tram", "turnout_7", "turnout_26", "crossover", "dual_gauge", "noisy", "sparse"),
     *("ballast", "platform", "gaps", "thin_points", "strips_meet", "double_slip", "three_way_apart", "side_30"),
     *("crossing", "standing_train", "grooved", "near_tracks", "flyover", "parked_train"),
+    *("whole_tenth", "whole_side", "whole_turnout"),
     *("raw turnout 1:9", "raw metro", "raw crossing", "raw air 80", "raw photo curve", "raw car park"),
 )
 """Scenes that a test runs: at least one for each kind of place."""
