@@ -250,7 +250,7 @@ def with_strays(seed: int) -> TrackScene:
 
 
 def thinned(one: TrackScene, step: int) -> TrackScene:
-    """Return a scene with only every so many vertices, and the last."""
+    """Return a scene with every `step`-th vertex only, and the last."""
     kept = np.unique(np.append(np.arange(0, len(one.track.xyz), step), len(one.track.xyz) - 1))
     return replace(one, track=replace(one.track, xyz=one.track.xyz[kept], is_bridged=one.track.is_bridged[kept]))
 
