@@ -40,6 +40,10 @@ LEVEL_M, CROWN_M = 0.05, 0.015
 """Height of the points that make a level, about that of a head with its faces, and of the fullest part of it, which is
 the crown: all but a tenth of its points, with a noise of 4 mm."""
 
+MIN_CROWN_SHARE = 0.5
+"""Points of a crown as a share of those in the fullest part of the level: a scanner to one side sees more of the face
+than of the crown above it."""
+
 MIN_IN_LEVEL, MIN_LEVEL_SHARE = 3, 0.15
 """Fewest points of a level, and their least share of those in the fullest level of the place: fewer are strays."""
 
@@ -94,13 +98,16 @@ class Levels:
         height, count = np.full((places, LEVELS), np.nan), np.zeros((places, LEVELS), dtype=int)
         order = np.lexsort((z, place))
         place, z = place[order], z[order]
-        for number in range(LEVELS if len(z) else 0):
-            first, inside = _fullest(place, z, LEVEL_M)
+        for number in range(LEVELS):
+            if not len(z):
+                break
+            first, inside = _highest(place, z, LEVEL_M, 1.0)
+            first, inside = first[inside >= MIN_IN_LEVEL], inside[inside >= MIN_IN_LEVEL]
             if not len(first):
                 break
             of_level = np.repeat(np.arange(len(first)), inside)
             member = np.arange(inside.sum()) + np.repeat(first - np.cumsum(inside) + inside, inside)
-            crown, in_crown = _fullest(of_level, z[member], CROWN_M, 1)
+            crown, in_crown = _highest(of_level, z[member], CROWN_M, MIN_CROWN_SHARE)
             here = place[first]
             height[here, number] = z[member][crown + in_crown // 2]
             count[here, number] = inside
@@ -118,23 +125,19 @@ class Levels:
         return 1.4826 * float(np.median(above_m)) if len(above_m) else 0.0
 
 
-def _fullest(
-    group: np.ndarray, z: np.ndarray, window_m: float, least: int = MIN_IN_LEVEL
-) -> tuple[np.ndarray, np.ndarray]:
-    """Find the window of heights with most points in each group; sorted by group and height.
+def _highest(group: np.ndarray, z: np.ndarray, window_m: float, share: float) -> tuple[np.ndarray, np.ndarray]:
+    """Find the highest window of heights in each group with a share of the points of the fullest one.
 
-    Returns the first point of each window, and the number of its points, (k,) each, for groups with `least` of them.
+    The points, at least one, are sorted by group and height. Returns the first point of each window, and the number of
+    its points, (k,) each.
     """
-    if not len(z):
-        return np.empty(0, dtype=int), np.empty(0, dtype=int)
     key = group * (np.ptp(z) + 2 * window_m) + z - z.min()
     inside = np.searchsorted(key, key + window_m, side="right") - np.arange(len(key))
     borders = np.flatnonzero(np.diff(group, prepend=-1))
-    best = np.maximum.reduceat(inside, borders)
-    size = np.diff(np.append(borders, len(group)))
-    at_best = np.flatnonzero(inside == np.repeat(best, size))
-    first = at_best[np.flatnonzero(np.diff(group[at_best], prepend=-1))]
-    return first[best >= least], best[best >= least]
+    best = np.repeat(np.maximum.reduceat(inside, borders), np.diff(np.append(borders, len(group))))
+    enough = np.flatnonzero(inside >= share * best)
+    last = enough[np.flatnonzero(np.diff(group[enough], append=-1))]
+    return last, inside[last]
 
 
 def heads_of(points: RailPoints) -> RailPoints:
