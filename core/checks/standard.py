@@ -5,11 +5,14 @@ See docs/method.md section 1.5.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
 from ..classify.settings import Settings
+from ..classify.sharpness import search_alike
 from ..classify.square import classify_square
 from ..clouds.points import Request
 from ..errors import CloudError, ParameterError
@@ -18,7 +21,7 @@ from ..heads.roads import MIN_WIDER_M
 from ..heads.sections import likelier_width
 from ..parameters import Parameters
 from ..progress import SILENT, Progress
-from ..rails import HEAD_OFF_M, HeadWidths, RailLine
+from ..rails import HEAD_OFF_M, HeadWidths, RailLine, SearchFigures
 from ..squares.density import fullest_square
 from ..squares.grid import PointSource
 from ..standards import HEAD_WIDTH_RANGE_MM, SAME_GAUGE_M, STANDARDS, Gauge, RailStandard, closest_standard
@@ -83,13 +86,36 @@ def detect_in_raw(request: Request, progress: Progress = SILENT) -> RailStandard
     corners = np.floor(xyz[:, :2] / RAW_SQUARE_M).astype(np.int64)
     keys, square, counts = np.unique(corners, axis=0, return_inverse=True, return_counts=True)
     fullest = np.argsort(-counts, kind="stable")[:RAW_SQUARES]
-    best_m, found = 0.0, np.empty((0, 3))
-    for gauge_m, share in zip(_plausible_gauges(), progress.split(len(_plausible_gauges()))):
-        paired_m, rails = 0.0, [np.empty((0, 3))]
-        for classified, mine in search_alike(share.follow(fullest), partial(search, Settings((gauge_m,), RAW_HEAD_M)):
+    squares = [(np.append(RAW_SQUARE_M * keys[one], 0.0), xyz[square.ravel() == one]) for one in fullest]
+    best_m, best = 0.0, np.empty((0, 3))
+    for gauge_m in progress.follow(_plausible_gauges()):
+        found = _found(squares, Settings((gauge_m,), RAW_HEAD_M))
+        paired_m = sum(one.figures.paired_m for one in found)
         if paired_m > best_m:
-            best_m, found = paired_m, np.concatenate(rails)
-    return _detected(measure_spacings(found), progress)
+            best_m, best = paired_m, np.concatenate([one.rails for one in found])
+    return _detected(measure_spacings(best), progress)
+
+
+_Square = tuple[np.ndarray, np.ndarray]
+"""The corner of a square, (3,), and its points, (n, 3)."""
+
+
+class _Found(NamedTuple):
+    """Points on rails in a square, (n, 3), and figures."""
+
+    rails: np.ndarray
+    figures: SearchFigures
+
+
+def _found(squares: Sequence[_Square], settings: Settings) -> list[_Found]:
+    """Find the points on rails in squares of a raw cloud."""
+
+    def search(some: Sequence[_Square], blunt: bool) -> Iterator[_Found]:
+        for corner, xyz in some:
+            classified = classify_square(xyz - corner, replace(settings, blunt=blunt))
+            yield _Found(xyz[classified.rail], classified.figures)
+
+    return list(search_alike(squares, search))
 
 
 def _plausible_gauges() -> list[float]:

@@ -127,25 +127,27 @@ class OnHeads:
     read : callable
         Returns the points, (n, 3) metres, of the square of the classification in a column and row, with its margin.
     settings : GrowSettings
-    places : (k, 2) array
-        Seeds: the rails around them show whether the cloud is sharp.
     """
 
-    def __init__(self, read: Callable[[Key], np.ndarray], settings: GrowSettings, places: np.ndarray) -> None:
+    def __init__(self, read: Callable[[Key], np.ndarray], settings: GrowSettings) -> None:
         self._read, self._settings, self._own = read, settings, settings.classification
         self._squares: dict[Key, _Square] = {}
-        seen = SearchFigures()
-        for key in dict.fromkeys(key for place in places for key in self._keys(place, SHARP_M)):
-            if not is_decided(seen):
-                seen += self._square(key).figures
-        if is_blunt(seen):
-            self._own = replace(self._own, blunt=True)
-            self._squares.clear()
+        self._seen = SearchFigures()
 
     def around(self, xy: np.ndarray, reach_m: float) -> np.ndarray:
         """Return the points on heads, (k, 3), up to `reach_m` to the east, west, north and south of a place, (2,)."""
+        if not is_decided(self._seen):
+            self._decide_around(xy)
         found = [self._square(key) for key in self._keys(xy, reach_m)]
         return np.concatenate([one.xyz[one.tree.query_ball_point(xy, reach_m, p=np.inf)] for one in found])
+
+    def _decide_around(self, xy: np.ndarray) -> None:
+        """Find out whether the cloud is sharp or blunt, by the rails around a place."""
+        new = [key for key in self._keys(xy, SHARP_M) if key not in self._squares]
+        self._seen = sum((self._square(key).figures for key in new), self._seen)
+        if is_blunt(self._seen) and not self._own.blunt:
+            self._own = replace(self._own, blunt=True)
+            self._squares.clear()
 
     def all_around(self, xy: np.ndarray, reach_m: float) -> np.ndarray:
         """Return all points there, (k, 3); `reach_m` is at most the margin of a square."""

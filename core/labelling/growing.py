@@ -180,7 +180,7 @@ class Cloud:
         own = replace(settings.classification, guide=near)
         self._sorted, self._zero = sort_files(request, own, squares, InTurn(), progress), request.zero
         self._local = lru_cache(maxsize=1)(lambda key: self._zero.to_local(self.read(key)["xyz"]))
-        self.heads = OnHeads(self._local, settings, places)
+        self.heads = OnHeads(self._local, settings)
 
     def read(self, key: Key) -> np.ndarray:
         """Return the points of a square and of its margin, (n,) `finding.POINT`."""
