@@ -25,6 +25,9 @@ POINTS_PER_PLACE = 60
 MOST_PER_PLACE = 30
 """Points in the cell of a place that are looked at: with those of the cells next to it, they are enough."""
 
+BLOCK = 4096
+"""Places that are looked at together: their points take some 20 MB."""
+
 HALF_LENGTH_M = (0.25, 1.5)
 """Least and largest distance from a place, along the rail, of the points that belong to it. Where points are few, the
 second one finds them, and a rail of 25 m radius bends by 45 mm there, which is less than a head."""
@@ -62,9 +65,13 @@ MIN_ABOVE_SHARE = 1 / 3
 """Points of a head as a share of those on its web, foot or sleeper, at one place: from grazing angles, the foot returns
 twice as many. Strays above a head are fewer."""
 
+MAX_SPREAD_M = 0.04
+"""Largest standard deviation across of the points of a head: evenly on a head of 78 mm it is 23 mm, with the blur of
+images 35 mm. That of weeds and of ballast is 75 mm, the width that is looked at."""
+
 MOST_BELOW = 0.5
-"""Share of the places of a sheet with a head above, from which the sheet is what heads stand on. Below a standing train,
-heads are a smaller part of their sheet."""
+"""Share of a sheet with heads above from which it is what heads stand on. Of a rail below a standing train or weeds, a
+smaller part has something above it."""
 
 
 @dataclass(frozen=True)
@@ -77,27 +84,31 @@ class Levels:
         Height of the crown, metres.
     count : (p, LEVELS) int array
         Points of each level.
+    spread_m : (p, LEVELS) array
+        Standard deviation of these points across the rail, metres.
     """
 
     height: np.ndarray
     count: np.ndarray
+    spread_m: np.ndarray
 
     @classmethod
-    def of(cls, place: np.ndarray, z: np.ndarray, places: int) -> Levels:
+    def of(cls, place: np.ndarray, across: np.ndarray, z: np.ndarray, places: int) -> Levels:
         """Find the levels of places.
 
         Parameters
         ----------
         place : (n,) int array
             Place to which each point belongs.
-        z : (n,) array
-            Heights of the points.
+        across, z : (n,) arrays
+            Offsets of the points across the rail, and their heights.
         places : int
             Number of places.
         """
-        height, count = np.full((places, LEVELS), np.nan), np.zeros((places, LEVELS), dtype=int)
+        height, spread_m = np.full((2, places, LEVELS), np.nan)
+        count = np.zeros((places, LEVELS), dtype=int)
         order = np.lexsort((z, place))
-        place, z = place[order], z[order]
+        place, across, z = place[order], across[order], z[order]
         for number in range(LEVELS):
             if not len(z):
                 break
@@ -111,18 +122,19 @@ class Levels:
             here = place[first]
             height[here, number] = z[member][crown + in_crown // 2]
             count[here, number] = inside
+            mean, square = (np.bincount(of_level, across[member] ** power) / inside for power in (1, 2))
+            spread_m[here, number] = np.sqrt(np.maximum(square - mean**2, 0.0))
             bottom, top = np.full((2, places), np.inf)
             bottom[here], top[here] = z[first], z[first + inside - 1]
             left = ~((z >= bottom[place]) & (z <= top[place]))
-            place, z = place[left], z[left]
+            place, across, z = place[left], across[left], z[left]
         strays = count < MIN_LEVEL_SHARE * count.max(axis=1, keepdims=True, initial=0)
-        return cls(np.where(strays, np.nan, height), np.where(strays, 0, count))
+        return cls(np.where(strays, np.nan, height), np.where(strays, 0, count), spread_m)
 
-    def noise(self, place: np.ndarray, z: np.ndarray) -> float:
-        """Return the standard deviation of heights, metres, as points above the highest level of their place show it."""
+    def above(self, place: np.ndarray, z: np.ndarray) -> np.ndarray:
+        """Return the heights of points above the highest level of their place, metres, of those close to it."""
         above_m = z - np.fmax.reduce(self.height, axis=1)[place]
-        above_m = above_m[(above_m > 0) & (above_m < LEVEL_M)]
-        return 1.4826 * float(np.median(above_m)) if len(above_m) else 0.0
+        return above_m[(above_m > 0) & (above_m < LEVEL_M)]
 
 
 def _highest(group: np.ndarray, z: np.ndarray, window_m: float, share: float) -> tuple[np.ndarray, np.ndarray]:
@@ -145,7 +157,8 @@ def heads_of(points: RailPoints) -> RailPoints:
 
     Nothing is left out of a class that holds heads alone.
     """
-    return points.kept(on_heads(points.xyz))
+    kept = on_heads(points.xyz)
+    return points if kept.all() else points.kept(kept)
 
 
 def on_heads(xyz: np.ndarray) -> np.ndarray:
@@ -154,18 +167,15 @@ def on_heads(xyz: np.ndarray) -> np.ndarray:
         return np.zeros(0, dtype=bool)
     cell = np.floor(xyz[:, :2] / PLACE_M).astype(np.int64)
     _, first, place = np.unique(cell @ [1 << 32, 1], return_index=True, return_inverse=True)
-    sample = xyz[_thinned(place.ravel())]
-    places, own, point = Places.around(xyz[first, :2], sample[:, :2])
-    levels = Levels.of(own, sample[point, 2], len(first))
-    pairs = places.along()
-    head_m = HEAD_M + levels.noise(own, sample[point, 2])
-    below = _have_heads_above(levels, pairs, head_m)
-    if not below.any():
+    place = place.ravel()
+    sample = xyz[_thinned(place)]
+    places, levels, noise_m = _seen_at(xyz[first, :2], sample)
+    pairs, head_m = places.along(), HEAD_M + noise_m
+    lower, head = _heads_above(levels, pairs, head_m)
+    if not len(head):
         return np.ones(len(xyz), dtype=bool)
     sheet, height = _sheets(levels, pairs)
-    there = sheet >= 0
-    share = np.bincount(sheet[there], below[there]) / np.bincount(sheet[there])
-    return _kept(xyz[:, 2], place.ravel(), height, there & (share[sheet] >= MOST_BELOW), head_m)
+    return _kept(xyz[:, 2], place, height, _are_below(sheet, lower, head), head_m)
 
 
 def _thinned(place: np.ndarray) -> np.ndarray:
@@ -177,6 +187,19 @@ def _thinned(place: np.ndarray) -> np.ndarray:
     return order[chosen]
 
 
+def _seen_at(xy: np.ndarray, points: np.ndarray) -> tuple[Places, Levels, float]:
+    """Look at the points, (n, 3), around places, (p, 2); the third figure is the noise of heights, metres."""
+    tree, found = cKDTree(points[:, :2]), []
+    for block in np.array_split(xy, -(-len(xy) // BLOCK)):
+        places, own, point = Places.around(block, tree)
+        across, z = places.across(own, points[point, :2] - places.xy[own]), points[point, 2]
+        levels = Levels.of(own, across, z, len(block))
+        found.append((places.xy, places.direction, levels.height, levels.count, levels.spread_m, levels.above(own, z)))
+    places_xy, direction, height, count, spread_m, above_m = (np.concatenate(each) for each in zip(*found))
+    noise_m = 1.4826 * float(np.median(above_m)) if len(above_m) else 0.0
+    return Places(places_xy, direction), Levels(height, count, spread_m), noise_m
+
+
 @dataclass(frozen=True)
 class Places:
     """Places on rails: the middles of the points around them, (p, 2), and the directions of the rails, (p,) radians."""
@@ -185,24 +208,23 @@ class Places:
     direction: np.ndarray
 
     @classmethod
-    def around(cls, xy: np.ndarray, points: np.ndarray) -> tuple[Places, np.ndarray, np.ndarray]:
-        """Find the points that belong to places on rails, (p, 2), among (n, 2).
+    def around(cls, xy: np.ndarray, tree: cKDTree) -> tuple[Places, np.ndarray, np.ndarray]:
+        """Find the points of a tree, (n, 2), that belong to places on rails, (p, 2).
 
         Returns the places, and the place and the number of each point that belongs to one, (k,) each; a point may
         belong to several.
         """
-        tree = cKDTree(points)
-        nearest = tree.query(xy, min(POINTS_PER_PLACE, len(points)), workers=threads())[0].reshape(len(xy), -1)
+        nearest = tree.query(xy, min(POINTS_PER_PLACE, tree.n), workers=threads())[0].reshape(len(xy), -1)
         reach_m = np.hypot(np.clip(nearest[:, -1], *HALF_LENGTH_M), HALF_WIDTH_M)
         lists = tree.query_ball_point(xy, reach_m, workers=threads())
         place, point = np.repeat(np.arange(len(xy)), [len(one) for one in lists]), np.concatenate(lists).astype(int)
-        east, north = (points[point] - xy[place]).T
+        east, north = (tree.data[point] - xy[place]).T
         count = np.bincount(place, minlength=len(xy))
         x, y, xx, yy, xy_ = (
             np.bincount(place, one, len(xy)) / count for one in (east, north, east**2, north**2, east * north)
         )
         places = cls(xy + np.column_stack([x, y]), 0.5 * np.arctan2(2 * (xy_ - x * y), xx - x**2 - yy + y**2))
-        beside = np.abs(places.across(place, points[point] - xy[place])) <= HALF_WIDTH_M
+        beside = np.abs(places.across(place, tree.data[point] - xy[place])) <= HALF_WIDTH_M
         return places, place[beside], point[beside]
 
     def across(self, place: np.ndarray, step: np.ndarray) -> np.ndarray:
@@ -218,15 +240,28 @@ class Places:
         return one[beside], other[beside]
 
 
-def _have_heads_above(levels: Levels, pairs: tuple[np.ndarray, np.ndarray], head_m: float) -> np.ndarray:
-    """Return which levels of places have a level above, there or along the rail, that can be their head, (p, LEVELS)."""
+def _heads_above(levels: Levels, pairs: tuple[np.ndarray, np.ndarray], head_m: float) -> tuple[np.ndarray, np.ndarray]:
+    """Find the levels that can be the heads above others, at their place or along the rail.
+
+    Returns the numbers of the lower levels and of the heads, (k,) each, in order of places and their `LEVELS`.
+    """
     one, other = pairs
     above_m = levels.height[other][:, None, :] - levels.height[one][:, :, None]
     is_head = levels.count[other][:, None, :] >= MIN_ABOVE_SHARE * levels.count[one][:, :, None]
-    has_head = ((above_m >= head_m) & (above_m <= RAIL_M) & is_head).any(axis=2)
-    found = np.zeros(levels.height.shape, dtype=bool)
-    np.logical_or.at(found, one, has_head)
-    return found
+    is_head &= levels.spread_m[other][:, None, :] <= MAX_SPREAD_M
+    pair, lower, head = np.nonzero((above_m >= head_m) & (above_m <= RAIL_M) & is_head)
+    return one[pair] * LEVELS + lower, other[pair] * LEVELS + head
+
+
+def _are_below(sheet: np.ndarray, lower: np.ndarray, head: np.ndarray) -> np.ndarray:
+    """Return which levels are of sheets on which heads stand, given the sheets and numbers of levels, as an array.
+
+    Most of a sheet has a head above it, and has one of its own: a few points above a rail are near many of its places.
+    """
+    size = np.bincount(sheet[sheet >= 0])
+    heads = np.unique(np.column_stack([sheet.flat[lower], head]), axis=0)[:, 0]
+    each = [np.bincount(which, minlength=len(size)) for which in (sheet.flat[np.unique(lower)], heads)]
+    return (sheet >= 0) & (np.minimum(*each) >= MOST_BELOW * size)[sheet]
 
 
 def _sheets(levels: Levels, pairs: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:

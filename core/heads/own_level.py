@@ -13,7 +13,7 @@ import numpy as np
 from scipy.ndimage import binary_opening, median_filter
 
 from .head_points import MIN_ON_HEAD, HeadPoints
-from .level import LEVEL_BIN_M, robust_sigma
+from .level import LEVEL_BIN_M, medians, robust_sigma
 
 WINDOW_M = 0.02
 """Height in which the points on top of a head are: noise of 5 mm, and 100 mm of cant."""
@@ -89,7 +89,7 @@ def on_own_level(points: HeadPoints) -> HeadPoints:
     if head.sum() < max(MIN_ON_HEAD, MIN_IN_BIN * occupied) or points.is_blunt:
         return points
     number = (t / LEVEL_BIN_M).astype(int)
-    flat = points.z - _gradient(_levels(number[head], points.z[head]), t)
+    flat = _flat(number, points.z, t, head)
     levels = _levels(number[head], flat[head])
     step_m = _step(levels)
     chosen = _chain(_pieces(levels, step_m), step_m)
@@ -104,6 +104,17 @@ def on_own_level(points: HeadPoints) -> HeadPoints:
     other = binary_opening(any_level & ~own, np.ones(MIN_BINS))
     above = flat - np.interp(t, (bins + 0.5) * LEVEL_BIN_M, level)
     return points[(above <= ABOVE_M) & (above >= -BELOW_M) & ~other[number]]
+
+
+def _flat(number: np.ndarray, z: np.ndarray, t: np.ndarray, head: np.ndarray) -> np.ndarray:
+    """Return heights, (n,), without the gradient of the line, by bins of points, (n,), of which some are on the `head`.
+
+    The gradient of the medians of bins is taken off first: on a slope, a bin has no level. The levels then show what is
+    left of it, because medians of a head that is seen from one side are anywhere on its face.
+    """
+    bins, first, count = np.unique(number[head], return_index=True, return_counts=True)
+    flat = z - _gradient(_Levels(bins, medians(z[head], first, count)), t)
+    return flat - _gradient(_levels(number[head], flat[head]), t)
 
 
 def _gradient(levels: _Levels, at: np.ndarray) -> np.ndarray:
