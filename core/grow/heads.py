@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from ..classify.flush import BESIDE_M, HEAD_LEVEL_M
-from ..classify.sharpness import SHARP_M, is_blunt, is_decided
+from ..classify.sharpness import is_blunt, is_decided
 from ..classify.square import classify_square
 from ..polyline import Feet, length_along, project
 from ..rails import SearchFigures
@@ -132,22 +133,12 @@ class OnHeads:
     def __init__(self, read: Callable[[Key], np.ndarray], settings: GrowSettings) -> None:
         self._read, self._settings, self._own = read, settings, settings.classification
         self._squares: dict[Key, _Square] = {}
-        self._seen = SearchFigures()
+        self._is_decided = False
 
     def around(self, xy: np.ndarray, reach_m: float) -> np.ndarray:
         """Return the points on heads, (k, 3), up to `reach_m` to the east, west, north and south of a place, (2,)."""
-        if not is_decided(self._seen):
-            self._decide_around(xy)
         found = [self._square(key) for key in self._keys(xy, reach_m)]
         return np.concatenate([one.xyz[one.tree.query_ball_point(xy, reach_m, p=np.inf)] for one in found])
-
-    def _decide_around(self, xy: np.ndarray) -> None:
-        """Find out whether the cloud is sharp or blunt, by the rails around a place."""
-        new = [key for key in self._keys(xy, SHARP_M) if key not in self._squares]
-        self._seen = sum((self._square(key).figures for key in new), self._seen)
-        if is_blunt(self._seen) and not self._own.blunt:
-            self._own = replace(self._own, blunt=True)
-            self._squares.clear()
 
     def all_around(self, xy: np.ndarray, reach_m: float) -> np.ndarray:
         """Return all points there, (k, 3); `reach_m` is at most the margin of a square."""
@@ -198,6 +189,22 @@ class OnHeads:
         return [(c, r) for c in range(low[0], high[0] + 1) for r in range(low[1], high[1] + 1)]
 
     def _square(self, key: Key) -> _Square:
+        if not self._is_decided:
+            self._decide_around(key)
+        return self._classified(key)
+
+    def _decide_around(self, key: Key) -> None:
+        """Find out whether the cloud is sharp or blunt, by the rails in a square and in those next to it."""
+        seen = SearchFigures()
+        for step in sorted(product((-1, 0, 1), repeat=2), key=lambda step: np.hypot(*step)):
+            if not is_decided(seen):
+                seen += self._classified((key[0] + step[0], key[1] + step[1])).figures
+        self._is_decided = seen.sharp_m + seen.round_m > 0
+        if is_blunt(seen):
+            self._own = replace(self._own, blunt=True)
+            self._squares.clear()
+
+    def _classified(self, key: Key) -> _Square:
         if key not in self._squares:
             xyz = self._read(key)
             found = classify_square(xyz - np.append(np.multiply(key, self._own.side_m), 0.0), self._own)
