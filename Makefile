@@ -79,6 +79,14 @@ lint: .check/installed  ## check style, words, types and import rules
 env: plugin  ## print export lines for `$QGIS_PROCESS run railextract:extractrails`: eval "$(make -s env)"
 	@cat $(ENVIRONMENT)
 
+.PHONY: constants
+constants: .check/installed  ## write every named number with its reason to build/constants.md
+	@$(CHECK) tools/constants.py
+
+.PHONY: size
+size: .check/installed  ## count files and lines of each part, and named numbers, rooms and floors of the core
+	@$(CHECK) tools/size.py
+
 .PHONY: package
 package: .venv/installed  ## build the plugin's zip, build/rail_extract.zip
 	@$(PYTHON) tools/package.py

@@ -8,26 +8,16 @@ Usage: python benchmarks/airborne.py [--seeds 3] [--first 1] [--search] [--rows 
 from __future__ import annotations
 
 import argparse
-import tempfile
 import time
-from pathlib import Path
 
 import numpy as np
 from rail_extract.core.airborne.axis import axis_of_guide
 from rail_extract.core.airborne.fitting import SEEN, fit_tracks
-from rail_extract.core.airborne.proposals import propose_guides
-from rail_extract.core.airborne.run import Run
-from rail_extract.core.clouds.points import ask
-from rail_extract.core.parameters import AirborneParameters
-from rail_extract.core.polyline import resample
-from rail_extract.core.tasks import InTurn
+from rail_extract.laboratory.airborne.catalogue import FlownScene
 from rail_extract.laboratory.airborne.designs import SPACING_M, Design, canted_curve, curved_line, drawn_together, yard
 from rail_extract.laboratory.airborne.flight import Flight, fly
-from rail_extract.laboratory.airborne.ground import STEP_M
 from rail_extract.laboratory.airborne.landscapes import countryside, railway
-from rail_extract.laboratory.airborne.write import ORIGIN, write_airborne
-from rail_extract.laboratory.ruler.airborne import Stationwise, compare_stations
-from scipy.spatial import cKDTree
+from rail_extract.laboratory.ruler.airborne import Stationwise, compare_guides, compare_stations, proposed
 
 REACH_M, RAIL_HEIGHT_M = 3.0, 0.17
 
@@ -47,9 +37,6 @@ SEARCHES = {
     "roads and fields only, 25 cm, 10 per m2": (countryside, 10, 0.25),
 }
 """The same for searches without a guide."""
-
-ON_TRACK_M = 0.5
-"""Distance from a track within which a proposed guide is right."""
 
 APART_M = ((3.5, np.inf), (1.6, 3.5), (0.5, 1.6), (0.0, 0.5))
 """Distances from the next track by which the stations of yards are listed."""
@@ -77,31 +64,14 @@ def measured(design: Design, density: float, footprint_m: float, seed: int) -> t
 
 def searched(design: Design, density: float, footprint_m: float, seed: int) -> tuple[float, float, float, float, float]:
     """Return the length of tracks with a proposed guide, that of all, of false guides, the area in km2, and seconds."""
-    cloud = fly(design.world, design.where, design.width_m, Flight(density, footprint_m), seed)
-    with tempfile.TemporaryDirectory() as folder:
-        write_airborne(cloud, Path(folder) / "cloud.las")
-        request = ask(Path(folder) / "cloud.las", (1, 2))
-        parameters = AirborneParameters(1.435, SPACING_M - 1.435, footprint_m=footprint_m)
-        start = time.process_time()
-        found = propose_guides(Run(request, parameters, Path(folder) / "points", InTurn()))
-        seconds = time.process_time() - start
-    guides = [resample(found.frame.to_crs(one.xyz)[:, :2] - ORIGIN[:2], 1.0)[0] for one in found.guides]
-    visible = [
-        design.truth(number)[~design.is_hidden(number, np.arange(len(design.truth(number))) * STEP_M), :2]
-        for number in range(len(design.tracks))
-    ]
-    right_m = sum(STEP_M * _near(one, guides).sum() for one in visible)
-    all_tracks = [design.truth(number)[:, :2] for number in range(len(design.tracks))]
-    false_m = float(sum((~_near(one, all_tracks)).sum() for one in guides))
-    area_km2 = len(cloud.xyz) / density / 1e6
-    return right_m, STEP_M * sum(map(len, visible)), false_m, area_km2, seconds
-
-
-def _near(places: np.ndarray, lines: list[np.ndarray]) -> np.ndarray:
-    """Return which places, (n, 2), lie on lines, (n,) bool."""
-    if not lines:
-        return np.zeros(len(places), dtype=bool)
-    return cKDTree(np.concatenate(lines)).query(places)[0] < ON_TRACK_M
+    flight = Flight(density, footprint_m)
+    scene = FlownScene(design, flight, fly(design.world, design.where, design.width_m, flight, seed))
+    start = time.process_time()
+    found = proposed(scene)
+    seconds = time.process_time() - start
+    guided = compare_guides(scene, found)
+    area_km2 = len(scene.cloud.xyz) / density / 1e6
+    return guided.right_m, guided.visible_m, guided.false_m, area_km2, seconds
 
 
 def print_searches(rows: list[str], seeds: range) -> None:

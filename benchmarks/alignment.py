@@ -18,16 +18,12 @@ import numpy as np
 from rail_extract.core.alignment.elements import Alignment
 from rail_extract.core.alignment.fit import fit_track
 from rail_extract.core.alignment.given import noted
-from rail_extract.core.alignment.measured import Track
 from rail_extract.core.parameters import FitParameters
-from rail_extract.laboratory.designs import FAMILIES, Family, random_design, surveyed
+from rail_extract.laboratory.designs import FAMILIES, Family, random_design, surveyed, with_cant
 from rail_extract.laboratory.ruler.alignments import Met, bound_of, compared, quantiles, together
 
 SEED = 33_2026
 """Different from the seeds of the other benchmarks."""
-
-CANT_NOISE_M = 0.0004
-"""Standard deviation of a measured cant, metres."""
 
 MISALIGNMENTS = ((0.002, 25.0), (0.003, 15.0), (0.005, 8.0))
 """Standard deviation and correlation length of the misalignment, metres."""
@@ -132,11 +128,8 @@ def row_of(
         design = random_design(random, family, elements if length_m is None else 300)
         if length_m is not None:
             design = shortened(design, length_m)
-        line = surveyed(design, random, white_m, *shared)
-        s = np.arange(len(line), dtype=float)
-        cant = np.column_stack([s, design.cants(s) + CANT_NOISE_M * random.standard_normal(len(s))])
+        track = with_cant(design, surveyed(design, random, white_m, *shared), random)
         start = time.process_time()
-        track = Track(1, line, cant, np.zeros(len(line), dtype=bool))
         fixed = replace(design, plan=tuple(map(noted, design.plan))) if given else None
         fit = fit_track(track, design.frame, FitParameters(), fixed)
         seconds += time.process_time() - start

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import Optional
 
 import numpy as np
 
 from ..core.alignment.elements import Alignment, CantElement, VerticalElement, chained
+from ..core.alignment.given import noted
+from ..core.alignment.measured import Track
 from ..core.frame import LocalFrame
+from ..core.parameters import CLOTHOIDS, FitParameters
 
 
 @dataclass(frozen=True)
@@ -49,6 +53,9 @@ would not be built. A jump has to turn the line out of its course as far within 
 
 CANT_STEP_M, MAX_CANT_M = 0.005, 0.15
 """Cant is designed in steps, and limited, metres."""
+
+CANT_NOISE_M = 0.0004
+"""Standard deviation of a measured cant, metres."""
 
 CANT_RADII_M = 1_500.0
 """Curves of larger radius than this times a factor up to 2 have no cant, metres."""
@@ -177,3 +184,90 @@ def _correlated(random: np.random.Generator, s: np.ndarray, correlation_m: float
     kernel = np.exp(-2.0 * (np.arange(-reach, reach + 1) * step / correlation_m) ** 2)
     raw = np.convolve(random.standard_normal(len(s) + 2 * reach), kernel, mode="valid")
     return raw / np.sqrt(np.sum(kernel**2))
+
+
+def with_cant(design: Alignment, line: np.ndarray, random: np.random.Generator) -> Track:
+    """Return a line that was surveyed every metre, (n, 3), as a track with its measured cant."""
+    s = np.arange(len(line), dtype=float)
+    cant = np.column_stack([s, design.cants(s) + CANT_NOISE_M * random.standard_normal(len(s))])
+    return Track(1, line, cant, np.zeros(len(line), dtype=bool))
+
+
+@dataclass(frozen=True)
+class TrackScene:
+    """A design, the track that was measured of it, and how it is fitted.
+
+    Attributes
+    ----------
+    design : Alignment
+    track : Track
+    settings : FitParameters
+    fixed : Alignment, optional
+        Elements whose types are given.
+    """
+
+    design: Alignment
+    track: Track
+    settings: FitParameters = FitParameters()
+    fixed: Optional[Alignment] = None
+
+
+def scene(seed: int, family: str, count: int = 16, **errors: float) -> TrackScene:
+    """Return a random design of `count` elements, surveyed with errors; see `surveyed`."""
+    random = np.random.default_rng(seed)
+    design = random_design(random, FAMILIES[family], count)
+    return TrackScene(design, with_cant(design, surveyed(design, random, **errors), random))
+
+
+def with_clothoids(seed: int) -> TrackScene:
+    """Return a yard in whose alignment the curvature may not jump."""
+    return replace(scene(seed, "yard", 12), settings=FitParameters(transitions=CLOTHOIDS))
+
+
+def with_given(seed: int) -> TrackScene:
+    """Return a main line whose fit is given the types of the true elements."""
+    one = scene(seed, "main line")
+    return replace(one, fixed=replace(one.design, plan=tuple(map(noted, one.design.plan))))
+
+
+def with_gap(seed: int) -> TrackScene:
+    """Return a branch line with a bridged gap of 60 m, over which the line is straight."""
+    one = scene(seed, "branch line")
+    line, bridged = one.track.xyz.copy(), one.track.is_bridged.copy()
+    first = len(line) // 3
+    line[first : first + 61] = np.linspace(line[first], line[first + 60], 61)
+    bridged[first : first + 61] = True
+    return replace(one, track=replace(one.track, xyz=line, is_bridged=bridged))
+
+
+def with_strays(seed: int) -> TrackScene:
+    """Return a branch line with stray vertices: its last three, and single ones every 70 m."""
+    one = scene(seed, "branch line")
+    line = one.track.xyz.copy()
+    line[35::70, 1] += 0.08
+    line[-3:, 1] += [0.1, 0.2, 0.4]
+    return replace(one, track=replace(one.track, xyz=line))
+
+
+def thinned(one: TrackScene, step: int) -> TrackScene:
+    """Return a scene with every `step`-th vertex only, and the last."""
+    kept = np.unique(np.append(np.arange(0, len(one.track.xyz), step), len(one.track.xyz) - 1))
+    return replace(one, track=replace(one.track, xyz=one.track.xyz[kept], is_bridged=one.track.is_bridged[kept]))
+
+
+TRACKS: dict[str, Callable[[int], TrackScene]] = {
+    "main line": lambda seed: scene(seed, "main line"),
+    "branch line": lambda seed: scene(seed, "branch line"),
+    "yard": lambda seed: scene(seed, "yard"),
+    "misaligned": lambda seed: scene(seed, "branch line", white_m=0.001, misaligned_m=0.003),
+    "rough": lambda seed: scene(seed, "main line", white_m=0.001, misaligned_m=0.005, correlation_m=8.0),
+    "smoothed": lambda seed: thinned(
+        scene(seed, "branch line", white_m=0.00003, misaligned_m=0.0006, correlation_m=12.0), 3
+    ),
+    "few vertices": lambda seed: thinned(scene(seed, "main line"), 10),
+    "clothoids": with_clothoids,
+    "given": with_given,
+    "gap": with_gap,
+    "strays": with_strays,
+}
+"""Scenes by name, made from a seed, each for a kind of railway, of error or of request."""

@@ -1,4 +1,4 @@
-"""Write docs/constants.md: every number of the core and the laboratory that has a name, with its docstring.
+"""Write build/constants.md: every number of the core and the laboratory that has a name, with its docstring.
 
 Run `python tools/constants.py`. A docstring belongs to all assignments between it and the previous docstring.
 """
@@ -12,14 +12,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-PAGE = ROOT / "docs" / "constants.md"
+PAGE = ROOT / "build" / "constants.md"
 
 NAME = re.compile(r"_?[A-Z][A-Z0-9_]*")
 
 HEAD = """# Constants
 
 Every number of the core and of the laboratory that has a name, by module. `tools/constants.py` writes this page from
-the code, and a test compares it; [method.md](method.md) explains the steps in which the numbers are used.
+the code; [method.md](../docs/method.md) explains the steps in which the numbers are used.
 """
 
 
@@ -113,4 +113,5 @@ def _cell(text: str) -> str:
 
 
 if __name__ == "__main__":
+    PAGE.parent.mkdir(exist_ok=True)
     PAGE.write_text(page(), encoding="utf-8")

@@ -1,14 +1,38 @@
-"""How far tracks fitted in airborne clouds lie from the true ones."""
+"""How far tracks fitted in airborne clouds lie from the true ones, and how well guides for them are proposed."""
 
 from __future__ import annotations
 
+import tempfile
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ...core.polyline import length_along
+from ...core.airborne.files import survey_files
+from ...core.airborne.fitting import REASONS, STATION_M
+from ...core.airborne.proposals import Proposals, propose_guides
+from ...core.airborne.run import Run
+from ...core.airborne.survey import SWITCH, AirborneTrack, Guide, Survey
+from ...core.clouds.points import ask
+from ...core.parameters import AirborneParameters
+from ...core.polyline import length_along, resample
+from ...core.tasks import InTurn
+from ..airborne.catalogue import FlownScene
+from ..airborne.designs import SPACING_M, Design
+from ..airborne.ground import STEP_M
+from ..airborne.write import ORIGIN, write_airborne
+
+GAUGE_M, CLASSES = 1.435, (1, 2)
+"""Gauge of all tracks, metres, and the classes that are read."""
+
+ON_TRACK_M = 0.5
+"""Distance from a track within which a proposed guide is right, metres."""
+
+UNSEEN = ("", "empty", "hidden", "misled", "unsure", "twin", "aside", "sparse")
+"""Short names of `REASONS`, by which stations that are not seen are counted."""
 
 RIGHT_M, CERTAIN = 0.10, 1.96
 """A station within this distance is right, and one within as many standard errors is inside its 95 % interval."""
@@ -101,3 +125,107 @@ def compare_stations(
     across, height = np.where(seen, across, np.nan), np.where(seen, height, np.nan)
     within = seen & (np.abs(across) < CERTAIN * sigma_m)
     return Stationwise(seen, across, height, within, beside, flagged, length_along(truth[:, :2])[nearest])
+
+
+def surveyed(scene: FlownScene) -> Survey:
+    """Survey a scene along its guides, from files and back."""
+    guides = [Guide(1 + number, one + ORIGIN[:2]) for number, one in enumerate(scene.guides)]
+    with tempfile.TemporaryDirectory() as folder:
+        return survey_files(_run(scene, Path(folder)), guides)
+
+
+def proposed(scene: FlownScene) -> Proposals:
+    """Propose guides for a scene."""
+    with tempfile.TemporaryDirectory() as folder:
+        return propose_guides(_run(scene, Path(folder)))
+
+
+def _run(scene: FlownScene, folder: Path) -> Run:
+    write_airborne(scene.cloud, folder / "cloud.las")
+    parameters = AirborneParameters(GAUGE_M, SPACING_M - GAUGE_M, footprint_m=scene.flight.footprint_m)
+    return Run(ask(folder / "cloud.las", CLASSES), parameters, folder / "points", InTurn())
+
+
+def survey_figures(scene: FlownScene) -> dict[str, float]:
+    """Survey a scene along its guides, and measure the tracks that are found.
+
+    Returns
+    -------
+    dict of str to float
+        Shares of stations in per cent; errors in millimetres, rms across, and sd of the height; `wrong m`: length that
+        is seen where no track is; `others`: tracks without a guide; `said`: warnings; and, by the names of `UNSEEN`,
+        the number of stations that are not seen.
+    """
+    survey = surveyed(scene)
+    pairs = list(zip(survey.tracks, scene.meant))
+    rows = [compared(survey, track, scene.design, number) for track, number in pairs if number is not None]
+    shares = Stationwise.joined(rows).shares() if rows else (np.nan,) * 5
+    reasons = Counter(REASONS.index(one) for track in survey.tracks for one in track.reason if one in REASONS[1:])
+    seen, right, rms, sd, within = shares
+    return {
+        "seen %": 100 * seen,
+        "right %": 100 * right,
+        "across mm": rms,
+        "height mm": sd,
+        "within %": 100 * within,
+        "wrong m": STATION_M * float(sum(track.seen.sum() for track, number in pairs if number is None)),
+        "lines": len(survey.lines),
+        "flagged": sum(one == SWITCH for track in survey.tracks for one in track.reason),
+        "others": sum(len(track.others) for track in survey.tracks),
+        "said": len(survey.warnings),
+        **{UNSEEN[code]: count for code, count in sorted(reasons.items())},
+    }
+
+
+def compared(survey: Survey, track: AirborneTrack, design: Design, number: int) -> Stationwise:
+    """Compare the stations of a track with a true one, except where a train hides it."""
+    xyz = survey.frame.to_crs(track.xyz) - ORIGIN
+    at_switch = np.array([one == SWITCH for one in track.reason])
+    others = [design.truth(other) for other in range(len(design.tracks)) if other != number]
+    found = compare_stations(
+        xyz, track.seen.astype(bool), track.sigma_mm / 1000, at_switch, design.truth(number), others
+    )
+    return found[~design.is_hidden(number, found.along_m)]
+
+
+@dataclass(frozen=True)
+class Guided:
+    """How well guides are proposed: lengths in metres.
+
+    Attributes
+    ----------
+    right_m, visible_m : float
+        Length of tracks with a proposed guide, and of all that are not hidden.
+    false_m : float
+        Length of guides without a track.
+    """
+
+    right_m: float
+    visible_m: float
+    false_m: float
+
+
+def compare_guides(scene: FlownScene, found: Proposals) -> Guided:
+    """Compare proposed guides with the true tracks of a scene."""
+    design = scene.design
+    guides = [resample(found.frame.to_crs(one.xyz)[:, :2] - ORIGIN[:2], 1.0)[0] for one in found.guides]
+    tracks = [design.truth(number)[:, :2] for number in range(len(design.tracks))]
+    visible = [track[~design.is_hidden(number, np.arange(len(track)) * STEP_M)] for number, track in enumerate(tracks)]
+    return Guided(
+        STEP_M * float(sum(_near(one, guides).sum() for one in visible)),
+        STEP_M * float(sum(map(len, visible))),
+        float(sum((~_near(one, tracks)).sum() for one in guides)),
+    )
+
+
+def guide_figures(scene: FlownScene) -> dict[str, float]:
+    """Propose guides for a scene, and measure them: the share of tracks in per cent, and false metres."""
+    found = compare_guides(scene, proposed(scene))
+    return {"found %": 100 * found.right_m / found.visible_m, "wrong m": found.false_m}
+
+
+def _near(places: np.ndarray, lines: Sequence[np.ndarray]) -> np.ndarray:
+    """Return which places, (n, 2), lie on lines, (n,) bool."""
+    if not lines:
+        return np.zeros(len(places), dtype=bool)
+    return cKDTree(np.concatenate(lines)).query(places)[0] < ON_TRACK_M

@@ -10,11 +10,15 @@ import numpy as np
 from scipy.special import erf
 
 from ...core.alignment.elements import Alignment, Element, PlanElement, VerticalElement
+from ...core.alignment.fit import fit_track
 from ...core.alignment.given import given_of, noted
 from ...core.alignment.noise import Noise
 from ...core.alignment.plane_fit import Points, fit_plan
 from ...core.alignment.uncertainty import plan_errors
+from ...core.errors import ParameterError
 from ...core.polyline import length_along
+from ...core.progress import SILENT, Recording
+from ..designs import TrackScene
 
 SIZES, TINY = 100_000, 1e-9
 """Number of sizes of an error that are tried, and least standard deviation, metres."""
@@ -171,3 +175,47 @@ def _start_scores(true: Sequence[PlanElement], fitted: Sequence[PlanElement]) ->
         error = nearest.s_from - one.s_from
         if nearest.figures.sigma_s_m and abs(error) < NEAR_M:
             yield error / nearest.figures.sigma_s_m
+
+
+def fit_figures(scene: TrackScene) -> dict[str, float]:
+    """Fit an alignment to a scene, and measure it.
+
+    Returns
+    -------
+    dict of str to float
+        `found %`: share of the true elements that were found; `elements`: number of those that were fitted; `radius %`
+        and `ends m`: median errors of radii and of ends; `curve mm`: distance of the curve from the true one (rms);
+        `in sigmas`: errors of tangent points in units of their standard errors (rms); `curves`, `ramps` and `ramp m`:
+        parabolas and ramps of cant that were found, and the median error of their ends; `off mm`: distance of the
+        points from the curve (rms); `round`: radii whose proposal is the true one; `said`: number of warnings. Where
+        the track is refused, nothing is found and one thing is said.
+    """
+    heard = Recording(SILENT)
+    try:
+        fit = fit_track(scene.track, scene.design.frame, scene.settings, scene.fixed, heard)
+    except ParameterError:
+        return {"found %": 0.0, "said": 1}
+    met = compared(scene.design, fit.alignment)
+    true = {round(1.0 / one.k_from) for one in scene.design.plan if one.type == "arc"}
+    return {
+        "found %": 100.0 * met.found / met.true,
+        "elements": met.fitted,
+        "radius %": 100.0 * _median(met.radius),
+        "ends m": _median(met.ends_m),
+        "curve mm": 1000.0 * _rms(met.curve_m),
+        "in sigmas": _rms(met.start_scores),
+        "curves": met.curves_found,
+        "ramps": met.ramps_found,
+        "ramp m": _median(met.ramp_ends_m),
+        "off mm": fit.rms_mm,
+        "round": sum(one.figures.r_round_m in true for one in fit.alignment.plan),
+        "said": len(heard.warnings),
+    }
+
+
+def _median(values: np.ndarray) -> float:
+    return float(np.median(values)) if len(values) else np.nan
+
+
+def _rms(values: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(values**2))) if len(values) else np.nan

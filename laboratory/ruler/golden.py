@@ -11,32 +11,43 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Union
 
 import numpy as np
 
 from ...core.parameters import Parameters
 from ...core.pipeline import extract_rails
 from ...core.rails import RailNetwork
+from ..airborne.catalogue import FLOWN, FlownScene
+from ..designs import TRACKS, TrackScene
 from ..scenes.adversarial import ADVERSARIAL
 from ..scenes.catalogue import SCENES
 from ..scenes.layouts import LAYOUTS
 from ..scenes.raw import RawScene
 from ..scenes.raw_catalogue import AIR, RAW_SCENES
 from ..scenes.scene import Scene
+from .airborne import guide_figures, survey_figures
+from .alignments import fit_figures
 from .classification import score
 from .lines import Match, match
 from .measuring import QUALITY_STEP_M, local_sigma
 
+AnyScene = Union[Scene, RawScene, FlownScene, TrackScene]
+
 DRAWN: dict[str, Callable[..., Scene]] = {**SCENES, **ADVERSARIAL, **LAYOUTS}
 """Scenes of classified points, by name."""
 
-RAW_SEED = 2026
-"""Seed of the raw scenes."""
+RAW, GUIDED, FITTED = "raw ", "guide ", "fit "
+"""What the names of raw scenes begin with, of those that are flown, and of tracks to which alignments are fitted."""
 
-RAW = "raw "
-"""What the names of raw scenes begin with."""
+SEEDED: dict[str, tuple[Callable[[int], AnyScene], int]] = {
+    **{RAW + name: (make, 2026) for name, make in RAW_SCENES.items()},
+    **{GUIDED + name: (make, 3) for name, make in FLOWN.items()},
+    **{FITTED + name: (make, 7) for name, make in TRACKS.items()},
+}
+"""Other scenes, by name, and their seeds."""
 
-PLACES = (*DRAWN, *(RAW + name for name in RAW_SCENES))
+PLACES = (*DRAWN, *SEEDED)
 """Every scene of the table."""
 
 QUICK = (
@@ -44,6 +55,8 @@ QUICK = (
     *("ballast", "platform", "gaps", "thin_points", "strips_meet", "double_slip", "three_way_apart", "side_30"),
     *("crossing", "standing_train", "grooved", "near_tracks", "flyover", "parked_train"),
     *("raw turnout 1:9", "raw metro", "raw crossing", "raw air 80", "raw photo curve", "raw car park"),
+    *(GUIDED + name for name in FLOWN),
+    *(FITTED + name for name in TRACKS),
 )
 """Scenes that a test runs: at least one for each kind of place."""
 
@@ -106,10 +119,11 @@ class Difference:
         return f"{self.scene:<24}{self.figure:<16}{self.before:>10.2f} -> {self.now:.2f}"
 
 
-def build_scene(place: str, seed_shift: int = 0) -> Scene | RawScene:
+def build_scene(place: str, seed_shift: int = 0) -> AnyScene:
     """Build one scene of `PLACES`, from a seed other than its own if `seed_shift` is not 0."""
-    if place.startswith(RAW):
-        return RAW_SCENES[place[len(RAW) :]](RAW_SEED + seed_shift)
+    if place in SEEDED:
+        build, seed = SEEDED[place]
+        return build(seed + seed_shift)
     make = DRAWN[place]
     return make(seed=inspect.signature(make).parameters["seed"].default + seed_shift)
 
@@ -127,8 +141,12 @@ def parameters_of(scene: Scene, variant: Variant = PLAIN) -> Parameters:
     )
 
 
-def figures_of(place: str, scene: Scene | RawScene, variant: Variant = PLAIN) -> Figures:
+def figures_of(place: str, scene: AnyScene, variant: Variant = PLAIN) -> Figures:
     """Run one scene of `PLACES` and measure what comes out."""
+    if isinstance(scene, TrackScene):
+        return fit_figures(scene)
+    if isinstance(scene, FlownScene):
+        return survey_figures(scene) if scene.guides else guide_figures(scene)
     if isinstance(scene, RawScene):
         return _raw_figures(scene, wide=place[len(RAW) :] in AIR)
     return line_figures(scene, extract_rails([scene.rail_points()], parameters_of(scene, variant)))

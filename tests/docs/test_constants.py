@@ -1,11 +1,7 @@
-"""The page of constants is that of the code, and every constant of the core has a reason."""
+"""Every constant of the core has a reason."""
 
 import constants
 import pytest
-
-
-def test_the_page_is_up_to_date():
-    assert constants.PAGE.read_text(encoding="utf-8") == constants.page(), "run python tools/constants.py"
 
 
 def test_every_constant_of_the_core_has_a_docstring():
