@@ -6,7 +6,7 @@ Lengths are metres and places local metres of the alignment's frame. `s` is the 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import ClassVar, Optional, Union
 
@@ -150,6 +150,12 @@ class VerticalElement:
         """Change of the gradient in 1/m, positive in a sag: the inverse of the radius."""
         return (self.grade_to - self.grade_from) / self.length_m
 
+    def part(self, start: float, end: float) -> VerticalElement:
+        """Return the part between two places on the element."""
+        grades = [self.grade_from + (s - self.s_from) * self.curvature for s in (start, end)]
+        z = self.z + 0.5 * (start - self.s_from) * (self.grade_from + grades[0])
+        return replace(self, s_from=start, length_m=end - start, z=z, grade_from=grades[0], grade_to=grades[1])
+
 
 @dataclass(frozen=True)
 class CantElement:
@@ -174,6 +180,12 @@ class CantElement:
     def type(self) -> str:
         """Constant or ramp."""
         return "constant" if self.cant_from_m == self.cant_to_m else "ramp"
+
+    def part(self, start: float, end: float) -> CantElement:
+        """Return the part between two places on the element."""
+        ramp = (self.cant_to_m - self.cant_from_m) / self.length_m
+        cants = [self.cant_from_m + (s - self.s_from) * ramp for s in (start, end)]
+        return replace(self, s_from=start, length_m=end - start, cant_from_m=cants[0], cant_to_m=cants[1])
 
     @property
     def s_to(self) -> float:

@@ -63,11 +63,11 @@ def _cut(
     """Return elements without what lies beyond the plan, and warn where either ends before the other."""
     if not elements:
         return ()
-    own, plan = (elements[0].s_from, elements[-1].s_to), (alignment.s_from, alignment.s_to)
-    if np.allclose(own, plan, rtol=0.0, atol=CONTINUED_M):
+    ends = (elements[0].s_from, elements[-1].s_to, alignment.s_from, alignment.s_to)
+    if np.allclose(ends[:2], ends[2:], rtol=0.0, atol=CONTINUED_M):
         return tuple(elements)
-    kept = tuple(part for one in elements for part in _between(one, *plan))
-    first, last, start, end = (start_m + s for s in (*own, *plan))
+    kept = tuple(part for one in elements for part in _between(one, ends[2], ends[3]))
+    first, last, start, end = (start_m + s for s in ends)
     what = "it is used only where it is on the plan, and unknown elsewhere" if kept else "it is left out"
     progress.warning(
         f"The {where} reaches from {first:.2f} m to {last:.2f} m, and the plan from {start:.2f} m to {end:.2f} m: "
@@ -81,13 +81,4 @@ def _between(one: Bent, first: float, last: float) -> list[Bent]:
     start, end = max(one.s_from, first), min(one.s_to, last)
     if end <= start:
         return []
-    if (start, end) == (one.s_from, one.s_to):
-        return [one]
-    shares = (start - one.s_from) / one.length_m, (end - one.s_from) / one.length_m
-    if isinstance(one, CantElement):
-        change = one.cant_to_m - one.cant_from_m
-        cants = [one.cant_from_m + share * change for share in shares]
-        return [replace(one, s_from=start, length_m=end - start, cant_from_m=cants[0], cant_to_m=cants[1])]
-    grades = [one.grade_from + share * (one.grade_to - one.grade_from) for share in shares]
-    z = one.z + 0.5 * (start - one.s_from) * (one.grade_from + grades[0])
-    return [replace(one, s_from=start, length_m=end - start, z=z, grade_from=grades[0], grade_to=grades[1])]
+    return [one if (start, end) == (one.s_from, one.s_to) else one.part(start, end)]
