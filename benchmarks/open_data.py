@@ -22,6 +22,7 @@ from rail_extract.core.clouds.las import laspy
 from rail_extract.core.clouds.points import RailPoints
 from rail_extract.core.errors import ParameterError, RailExtractError
 from rail_extract.core.frame import LocalFrame
+from rail_extract.core.heads.on_heads import on_heads
 from rail_extract.core.learned.model import SHIPPED
 from rail_extract.core.parameters import Parameters
 from rail_extract.core.pipeline import extract_rails
@@ -32,8 +33,8 @@ from rail_extract.laboratory.ruler.lines import cut, nearest
 from rail_extract.laboratory.ruler.whole_clouds import classify_cloud
 from scipy.spatial import cKDTree
 
-CELL_M, HEAD_M = 0.25, 0.040
-"""Labelled points this far below the highest one of their cell are on the head; feet and webs are deeper."""
+CELL_M = 0.25
+"""Side of the cells in which lines are looked for."""
 
 NEAR_M = 0.10
 """A line is right within this distance of labelled points: people label to some centimetres."""
@@ -153,7 +154,8 @@ def main(words: Sequence[str] | None = None) -> None:
         standard = chosen_standard(data)
         if arguments.repeated:
             places = covered_twice(places)
-        evaluate(data, standard, spread(places, arguments.places), SHIPPED if arguments.learned else None)
+        weights = SHIPPED if arguments.learned else None
+        evaluate(data, standard, spread(places, arguments.places), weights, arguments.labelled)
     except RailExtractError as error:
         sys.exit(str(error))
 
@@ -167,6 +169,7 @@ def parsed(words: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--rail-class", type=int, help="class of rail points in the files")
     parser.add_argument("--standard", help="rail standard, such as EN_60E1_1435")
     parser.add_argument("--learned", action="store_true", help="find the points by the shipped network")
+    parser.add_argument("--labelled", action="store_true", help="take the labelled points instead of finding any")
     return parser.parse_args(words)
 
 
@@ -247,7 +250,9 @@ def _header(path: Path) -> laspy.LasHeader:
         return reader.header
 
 
-def evaluate(data: DataSet, standard: RailStandard, places: Sequence[Place], weights: Path | None) -> None:
+def evaluate(
+    data: DataSet, standard: RailStandard, places: Sequence[Place], weights: Path | None, labelled: bool
+) -> None:
     """Measure places one after another, and print what was measured."""
     print(f"{data.name}: {len(places)} places, class {data.rail_class} is rail, {standard.name}")
     print(
@@ -259,7 +264,7 @@ def evaluate(data: DataSet, standard: RailStandard, places: Sequence[Place], wei
     for place in places:
         xyz, classes = read(place)
         rail = classes == data.rail_class
-        result, visit = measure(place, xyz, classes, rail, standard, weights)
+        result, visit = measure(place, xyz, classes, rail, standard, weights, labelled)
         print(row(place.name, result, detected(xyz[rail])), flush=True)
         visits.append(visit)
         total = result if total is None else total + result
@@ -286,15 +291,17 @@ def measure(
     rail: np.ndarray,
     standard: RailStandard,
     weights: Path | None,
+    labelled: bool,
 ) -> tuple[Result, Visit]:
-    """Find rail points and rails at a place, and compare them with the labels, (n,) bool."""
-    start = time.process_time()
-    found = classify_cloud(xyz, Settings((standard.gauge_m,), standard.head_width_m, weights=weights)).rail
-    labelled = time.process_time()
+    """Find rail points, unless the labelled ones are taken, and rails at a place, and compare them with the labels."""
+    start, found = time.process_time(), rail
+    if not labelled:
+        found = classify_cloud(xyz, Settings((standard.gauge_m,), standard.head_width_m, weights=weights)).rail
+    classified = time.process_time()
     frame = LocalFrame(np.floor(xyz.min(axis=0)))
     rails, tracks_m, gauge_mm = draw(xyz[found], frame, standard)
     drawn = time.process_time()
-    heads = np.flatnonzero(rail)[on_heads(xyz[rail])]
+    heads = np.flatnonzero(rail)[on_heads(frame.to_local(xyz[rail]))]
     cells, cells_right, pieces_m, across_m, height_m = compare(rails, xyz[heads])
     result = Result(
         points=len(xyz),
@@ -312,8 +319,8 @@ def measure(
         across_m=across_m,
         height_m=height_m,
         gauge_mm=gauge_mm,
-        label_s=labelled - start,
-        line_s=drawn - labelled,
+        label_s=classified - start,
+        line_s=drawn - classified,
     )
     return result, Visit(place.run, rails)
 
@@ -327,14 +334,6 @@ def draw(xyz: np.ndarray, frame: LocalFrame, standard: RailStandard) -> tuple[tu
     rails = tuple(replace(one, xyz=network.frame.to_crs(one.xyz)) for one in network.rails)
     gauges = [track.gauge_mm[~track.bridged & np.isfinite(track.gauge_mm)] for track in network.geometry]
     return rails, sum(one.length_m for one in network.centerlines), np.concatenate([np.empty(0), *gauges])
-
-
-def on_heads(xyz: np.ndarray) -> np.ndarray:
-    """Labelled points, (n, 3), that are near the highest ones of their cells, (n,) bool."""
-    _, cell = np.unique(np.floor(xyz[:, :2] / CELL_M).astype(np.int64), axis=0, return_inverse=True)
-    top = np.full(int(cell.max(initial=-1)) + 1, -np.inf)
-    np.maximum.at(top, cell.ravel(), xyz[:, 2])
-    return xyz[:, 2] > top[cell.ravel()] - HEAD_M
 
 
 def compare(rails: Sequence[RailLine], heads: np.ndarray) -> tuple[int, int, float, np.ndarray, np.ndarray]:

@@ -88,8 +88,8 @@ def on_own_level(points: HeadPoints) -> HeadPoints:
     occupied = len(np.unique((t[head] / LEVEL_BIN_M).astype(int)))
     if head.sum() < max(MIN_ON_HEAD, MIN_IN_BIN * occupied) or points.is_blunt:
         return points
-    flat = points.z - _gradient(t[head], points.z[head], t)
     number = (t / LEVEL_BIN_M).astype(int)
+    flat = _flat(number, points.z, t, head)
     levels = _levels(number[head], flat[head])
     step_m = _step(levels)
     chosen = _chain(_pieces(levels, step_m), step_m)
@@ -106,13 +106,23 @@ def on_own_level(points: HeadPoints) -> HeadPoints:
     return points[(above <= ABOVE_M) & (above >= -BELOW_M) & ~other[number]]
 
 
-def _gradient(t: np.ndarray, z: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """Sum up the gradient of points, (n,), and return it at chainages `at`: steps do not count."""
-    number = (t / LEVEL_BIN_M).astype(int)
-    bins, first, count = np.unique(number, return_index=True, return_counts=True)
+def _flat(number: np.ndarray, z: np.ndarray, t: np.ndarray, head: np.ndarray) -> np.ndarray:
+    """Return heights, (n,), without the gradient of the line, by bins of points, (n,), of which some are on the `head`.
+
+    The gradient of the medians of bins is taken off first: on a slope, a bin has no level. The levels then show what is
+    left of it, because medians of a head that is seen from one side are anywhere on its face.
+    """
+    bins, first, count = np.unique(number[head], return_index=True, return_counts=True)
+    flat = z - _gradient(_Levels(bins, medians(z[head], first, count)), t)
+    return flat - _gradient(_levels(number[head], flat[head]), t)
+
+
+def _gradient(levels: _Levels, at: np.ndarray) -> np.ndarray:
+    """Sum up the gradient of the fullest levels, and return it at chainages `at`: steps do not count."""
+    bins, first = np.unique(levels.bin, return_index=True)
     if len(bins) < 2:
         return np.zeros(len(at))
-    place, height = t[first + count // 2], medians(z, first, count)
+    place, height = (bins + 0.5) * LEVEL_BIN_M, levels.height[first]
     slope = median_filter(np.diff(height) / np.diff(bins), SLOPE_BINS, mode="reflect") / LEVEL_BIN_M
     place = np.concatenate([[place[0] - 1.0], place, [place[-1] + 1.0]])
     slope = np.concatenate([slope[:1], slope, slope[-1:]])

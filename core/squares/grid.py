@@ -15,6 +15,7 @@ import numpy as np
 
 from ..clouds.points import RailPoints
 from ..frame import LocalFrame
+from ..heads.on_heads import heads_of
 from ..raster import TILE, RailRaster
 
 OVERLAP_M = 40.0
@@ -80,7 +81,7 @@ class Square:
 
 
 class PointSource(Protocol):
-    """Rail points of one class, read square by square."""
+    """Points on the heads of one class, read square by square."""
 
     @property
     def frame(self) -> LocalFrame:
@@ -96,7 +97,7 @@ class PointSource(Protocol):
 
     @property
     def counts(self) -> Mapping[Key, int]:
-        """Number of points by square; squares without points are not listed."""
+        """Number of points by square, on disk with those below heads; squares without points are not listed."""
 
     @property
     def span_m(self) -> float:
@@ -113,6 +114,7 @@ class MemorySource:
     """Points in memory, a `PointSource`."""
 
     def __init__(self, points: RailPoints, side_m: float) -> None:
+        points = heads_of(points)
         self.frame, self.class_code, self.side_m = points.frame, points.class_code, side_m
         origin = Square.on_grid((0, 0), side_m, points.frame).frame.shift_to(points.frame)
         self._points, self._members = points, points_by_square(points.xyz - origin, side_m)

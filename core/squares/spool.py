@@ -21,6 +21,7 @@ from ..clouds.points import RailPoints, Request, origin_steps
 from ..clouds.readers import CloudHeader
 from ..disk import writing
 from ..frame import LocalFrame
+from ..heads.on_heads import heads_of
 from ..progress import SILENT, Progress
 from ..scratch import discard, scratch_folder
 from .grid import Key, Square, around, points_by_square
@@ -79,7 +80,7 @@ class SpooledPoints:
         xyz = parts[0] if len(parts) == 1 else np.concatenate(parts or [np.empty((0, 3))])
         strips = np.array([self.passes[_numbers(file)[-1]] for file in files], dtype=np.int32)
         each = np.repeat(strips, [len(part) for part in parts]) if len(np.unique(strips)) > 1 else None
-        return RailPoints(xyz, square.frame, self.class_code, each)
+        return heads_of(RailPoints(xyz, square.frame, self.class_code, each))
 
     def part(self, square: Square) -> SpooledPoints:
         """Keep only a square and its neighbours, so that less is sent to a worker."""

@@ -26,6 +26,7 @@ from ..scenes.layouts import LAYOUTS
 from ..scenes.raw import RawScene
 from ..scenes.raw_catalogue import AIR, RAW_SCENES
 from ..scenes.scene import Scene
+from ..scenes.whole_rails import WHOLE
 from .airborne import guide_figures, survey_figures
 from .alignments import fit_figures
 from .classification import score
@@ -34,7 +35,7 @@ from .measuring import QUALITY_STEP_M, local_sigma
 
 AnyScene = Union[Scene, RawScene, FlownScene, TrackScene]
 
-DRAWN: dict[str, Callable[..., Scene]] = {**SCENES, **ADVERSARIAL, **LAYOUTS}
+DRAWN: dict[str, Callable[..., Scene]] = {**SCENES, **ADVERSARIAL, **LAYOUTS, **WHOLE}
 """Scenes of classified points, by name."""
 
 RAW, GUIDED, FITTED = "raw ", "guide ", "fit "
@@ -54,6 +55,7 @@ QUICK = (
     *("straight", "tram", "turnout_7", "turnout_26", "crossover", "dual_gauge", "noisy", "sparse"),
     *("ballast", "platform", "gaps", "thin_points", "strips_meet", "double_slip", "three_way_apart", "side_30"),
     *("crossing", "standing_train", "grooved", "near_tracks", "flyover", "parked_train"),
+    *("whole_tenth", "whole_side", "whole_turnout"),
     *("raw turnout 1:9", "raw metro", "raw crossing", "raw air 80", "raw photo curve", "raw car park"),
     *(GUIDED + name for name in FLOWN),
     *(FITTED + name for name in TRACKS),

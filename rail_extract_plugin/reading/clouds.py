@@ -111,7 +111,7 @@ def read_points(
     bounds: BoundsIn,
     progress: Progress,
 ) -> tuple[RailPoints, ...]:
-    """Read the points of the rail classes.
+    """Read the points on the heads of the rail classes.
 
     Parameters
     ----------
@@ -122,8 +122,10 @@ def read_points(
     progress : Progress
     """
     from ...core.clouds.points import read_requested
+    from ...core.heads.on_heads import heads_of
 
-    return read_requested(request_points(source, class_codes, bounds, progress), progress)
+    found = read_requested(request_points(source, class_codes, bounds, progress), progress)
+    return tuple(heads_of(points) for points in found)
 
 
 def spool_points(

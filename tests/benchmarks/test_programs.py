@@ -6,8 +6,12 @@ import subprocess
 import sys
 from pathlib import Path
 
+import laspy
+import numpy as np
 import pytest
 from rail_extract.core.squares import steps
+from rail_extract.laboratory.scenes.scene import RAIL
+from rail_extract.laboratory.scenes.whole_rails import WHOLE
 
 PROGRAMS = sorted((Path(__file__).resolve().parents[2] / "benchmarks").glob("*.py"))
 
@@ -19,6 +23,27 @@ def test_a_benchmark_fits_the_code_that_it_measures(program, monkeypatch):
     found = runpy.run_path(str(program))
     assert [name for name in found.get("STEPS", ()) if not hasattr(steps, name)] == []
     assert [name for owner, name, *_ in found.get("STAGES", ()) if name not in vars(owner)] == []
+
+
+@pytest.mark.parametrize("words", [["--labelled"], []])
+def test_open_data_is_evaluated_with_whole_rails_in_the_class(words, tmp_path, monkeypatch, capsys):
+    pytest.importorskip("torch")
+    monkeypatch.syspath_prepend(str(PROGRAMS[0].parent))
+    scene = WHOLE["whole"]()
+    header = laspy.LasHeader(version="1.2", point_format=3)
+    header.scales, header.offsets = np.full(3, 0.001), np.floor(scene.xyz.min(axis=0))
+    cloud = laspy.LasData(header)
+    cloud.x, cloud.y, cloud.z = scene.xyz.T
+    cloud.classification = np.where(scene.classification == RAIL, 5, scene.classification)
+    cloud.write(tmp_path / "ACQ_286_Don_Lens_F_0+950_1+000.laz")
+    runpy.run_path(str(PROGRAMS[0].parent / "open_data.py"))["main"]([str(tmp_path), *words])
+    row = capsys.readouterr().out.splitlines()[2].split()
+    found, right, across_mm, height_mm = (float(value) for value in row[5:9])
+    assert found > 99
+    assert right > 99
+    assert across_mm < 10  # the median of points on one side of a head
+    assert height_mm < 3
+    assert row[-1] == "EN_60E1_1435"
 
 
 PROGRAM = """
