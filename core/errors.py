@@ -58,6 +58,10 @@ class AlignmentFileError(RailExtractError):
     """A file of alignments is missing, damaged or states what can't be read."""
 
 
+class DesignNumberError(RailExtractError):
+    """A number of a design, or of what is placed by one, is not one that a railway has."""
+
+
 class ModelError(RailExtractError):
     """The network's weights are missing, are damaged or don't fit the rail standard."""
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime
+from itertools import count
 from typing import Optional
 
 import numpy as np
@@ -54,12 +55,13 @@ def names(alignments: Sequence[Alignment]) -> list[str]:
     >>> names([Alignment(3, LocalFrame(np.zeros(3)), ()), Alignment(None, LocalFrame(np.zeros(3)), ())])
     ['Track 3', 'Track']
     """
-    made: list[str] = []
+    made: dict[str, None] = {}
+    following: dict[str, Iterator[int]] = {}
     for one in alignments:
         base = one.name or ("Track" if one.track_id is None else f"Track {one.track_id}")
-        more = (f"{base} ({number})" for number in range(2, len(alignments) + 2))
-        made.append(base if base not in made else next(name for name in more if name not in made))
-    return made
+        more = (f"{base} ({number})" for number in following.setdefault(base, count(2)))
+        made[base if base not in made else next(name for name in more if name not in made)] = None
+    return list(made)
 
 
 def check_joined(alignment: Alignment) -> None:

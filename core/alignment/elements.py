@@ -6,7 +6,7 @@ Lengths are metres and places local metres of the alignment's frame. `s` is the 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import ClassVar, Optional, Union
 
@@ -24,6 +24,17 @@ LONGEST_STEP_M = 50.0
 
 STATION_M = 1.0
 """Distance between the places from which the search for a foot starts, metres."""
+
+CONTINUED_M = 1.0
+"""Profile and cant that end this near to the end of the plan, metres, are continued as the plan is; files round their
+stations. Those that end sooner are unknown farther on."""
+
+TURN_AT_ONCE_RAD = 2.0 * np.pi
+"""Largest turn that is integrated from the start of an element, radians: one that turns more often is cut into pieces,
+so that the time for a place does not depend on how often."""
+
+PLACES_AT_ONCE = 100_000
+"""Places that are computed at once: some 50 MB."""
 
 FOOT_STEPS = 4
 """Newton steps to a foot: from half a metre away, the error is below a micrometre after three."""
@@ -139,6 +150,12 @@ class VerticalElement:
         """Change of the gradient in 1/m, positive in a sag: the inverse of the radius."""
         return (self.grade_to - self.grade_from) / self.length_m
 
+    def part(self, start: float, end: float) -> VerticalElement:
+        """Return the part between two places on the element."""
+        grades = [self.grade_from + (s - self.s_from) * self.curvature for s in (start, end)]
+        z = self.z + 0.5 * (start - self.s_from) * (self.grade_from + grades[0])
+        return replace(self, s_from=start, length_m=end - start, z=z, grade_from=grades[0], grade_to=grades[1])
+
 
 @dataclass(frozen=True)
 class CantElement:
@@ -163,6 +180,12 @@ class CantElement:
     def type(self) -> str:
         """Constant or ramp."""
         return "constant" if self.cant_from_m == self.cant_to_m else "ramp"
+
+    def part(self, start: float, end: float) -> CantElement:
+        """Return the part between two places on the element."""
+        ramp = (self.cant_to_m - self.cant_from_m) / self.length_m
+        cants = [self.cant_from_m + (s - self.s_from) * ramp for s in (start, end)]
+        return replace(self, s_from=start, length_m=end - start, cant_from_m=cants[0], cant_to_m=cants[1])
 
     @property
     def s_to(self) -> float:
@@ -238,47 +261,53 @@ class Alignment:
 
     def places(self, s: np.ndarray) -> np.ndarray:
         """Return places in plan, (n, 2) local metres; outside, the first and the last element are continued."""
-        at, u = _within(self.plan, s)
-        columns = self._columns[at]
-        return columns[:, :2] + displaced(u, columns[:, 2], columns[:, 3], columns[:, 4])
+        parts = range(0, max(len(s), 1), PLACES_AT_ONCE)
+        return np.concatenate([self._places(s[start : start + PLACES_AT_ONCE]) for start in parts])
+
+    def _places(self, s: np.ndarray) -> np.ndarray:
+        columns, u = _at(self._pieces, s)
+        return columns[:, 1:3] + displaced(u, columns[:, 3], columns[:, 4], columns[:, 5])
 
     def headings(self, s: np.ndarray) -> np.ndarray:
         """Return directions, (n,) radians counterclockwise from the x axis."""
-        at, u = _within(self.plan, s)
-        columns = self._columns[at]
-        return columns[:, 2] + turned(u, columns[:, 3], columns[:, 4])
+        columns, u = _at(self._pieces, s)
+        return columns[:, 3] + turned(u, columns[:, 4], columns[:, 5])
 
     def curvatures(self, s: np.ndarray) -> np.ndarray:
         """Return curvatures, (n,) 1/m, positive to the left; at a jump, that ahead."""
-        at, u = _within(self.plan, s)
-        return self._columns[at, 3] + u * self._columns[at, 4]
+        columns, u = _at(self._pieces, s)
+        return columns[:, 4] + u * columns[:, 5]
 
     def heights(self, s: np.ndarray) -> np.ndarray:
-        """Return heights, (n,) local metres; NaN if they are unknown."""
+        """Return heights, (n,) local metres; NaN where they are unknown."""
         if not self.vertical:
             return np.full(len(s), np.nan)
-        at, u = _within(self.vertical, s)
-        z, grade, curvature = np.array([(one.z, one.grade_from, one.curvature) for one in self.vertical]).T
-        return z[at] + u * (grade[at] + 0.5 * u * curvature[at])
+        columns, u = _at(self._profile, s)
+        return np.where(
+            self._has(self.vertical, s), columns[:, 1] + u * (columns[:, 2] + 0.5 * u * columns[:, 3]), np.nan
+        )
 
     def grades(self, s: np.ndarray) -> np.ndarray:
-        """Return gradients, (n,) metres per metre, positive uphill; NaN if they are unknown."""
+        """Return gradients, (n,) metres per metre, positive uphill; NaN where they are unknown."""
         if not self.vertical:
             return np.full(len(s), np.nan)
-        at, u = _within(self.vertical, s)
-        grade, curvature = np.array([(one.grade_from, one.curvature) for one in self.vertical]).T
-        return grade[at] + u * curvature[at]
+        columns, u = _at(self._profile, s)
+        return np.where(self._has(self.vertical, s), columns[:, 2] + u * columns[:, 3], np.nan)
 
     def cants(self, s: np.ndarray) -> np.ndarray:
-        """Return cants, (n,) metres, left rail minus right rail; NaN if they are unknown."""
+        """Return cants, (n,) metres, left rail minus right rail; NaN where they are unknown."""
         if not self.cant:
             return np.full(len(s), np.nan)
-        at, u = _within(self.cant, s)
-        start, end, length = np.array([(one.cant_from_m, one.cant_to_m, one.length_m) for one in self.cant]).T
-        return start[at] + u * ((end - start) / length)[at]
+        columns, u = _at(self._ramps, s)
+        return np.where(self._has(self.cant, s), columns[:, 1] + u * columns[:, 2], np.nan)
+
+    def _has(self, elements: Sequence[Element], s: np.ndarray) -> np.ndarray:
+        """Return whether elements in height or of cant reach each distance, (n,) bool; with the plan, they continue."""
+        first, last = elements[0].s_from - CONTINUED_M, elements[-1].s_to + CONTINUED_M
+        return ((s >= first) | (first <= self.s_from)) & ((s <= last) | (last >= self.s_to))
 
     def xyz(self, s: np.ndarray) -> np.ndarray:
-        """Return places, (n, 3) local metres; z is NaN if heights are unknown."""
+        """Return places, (n, 3) local metres; z is NaN where heights are unknown."""
         return np.column_stack([self.places(s), self.heights(s)])
 
     def drawn(self, s_from: float, s_to: float) -> np.ndarray:
@@ -287,11 +316,13 @@ class Alignment:
 
     def stations(self, s_from: float, s_to: float) -> np.ndarray:
         """Return the distances along the curve of the vertices of `drawn`, (n,), with both ends."""
-        joints = [*(one.s_to for one in self.plan), *(one.s_to for one in self.vertical)]
-        inner = [joint for joint in joints if s_from < joint < s_to]
-        knots = np.unique([s_from, *inner, s_to])
-        parts = [self._steps(start, end) for start, end in zip(knots[:-1], knots[1:])]
-        return np.concatenate([*parts, knots[-1:]])
+        inner = slice(*np.searchsorted(self._joints, [np.nextafter(s_from, np.inf), s_to]))
+        knots = np.concatenate([[s_from], self._joints[inner], [s_to]])
+        step = np.diff(knots)
+        counts = np.ceil(step / self._steps(knots)).astype(int)
+        part = np.repeat(np.arange(len(counts)), counts)
+        number = np.arange(len(part)) - (np.cumsum(counts) - counts)[part]
+        return np.append(number * (step / counts)[part] + knots[:-1][part], s_to)
 
     def foot(self, xy: np.ndarray) -> Foot:
         """Return the nearest places of the curve to points, (n, 2) local metres."""
@@ -310,27 +341,55 @@ class Alignment:
         cos, sin = np.cos(heading), np.sin(heading)
         return np.array([away[:, 0] * cos + away[:, 1] * sin, away[:, 1] * cos - away[:, 0] * sin])
 
-    def _steps(self, start: float, end: float) -> np.ndarray:
-        """Return stations from `start` to before `end`, between which no element begins."""
-        bends = np.abs(self.curvatures(np.array([start, np.nextafter(end, start)])))
-        middle = np.array([0.5 * (start + end)])
-        at = _within(self.vertical, middle)[0][0] if self.vertical else None
-        sharpest = max(*bends, abs(self.vertical[at].curvature) if at is not None else 0.0)
-        step = min(np.sqrt(8.0 * SAGITTA_M / sharpest) if sharpest else LONGEST_STEP_M, LONGEST_STEP_M)
-        return np.linspace(start, end, int(np.ceil((end - start) / step)) + 1)[:-1]
+    def _steps(self, knots: np.ndarray) -> np.ndarray:
+        """Return the distance between vertices from each knot to the next, between which no element begins."""
+        ends = np.array([knots[:-1], np.nextafter(knots[1:], knots[:-1])])
+        sharpest = np.abs(self.curvatures(ends.ravel())).reshape(2, -1).max(axis=0)
+        if self.vertical:
+            sharpest = np.maximum(sharpest, np.abs(_at(self._profile, ends.mean(axis=0))[0][:, 3]))
+        return np.sqrt(8.0 * SAGITTA_M / np.maximum(sharpest, 8.0 * SAGITTA_M / LONGEST_STEP_M**2))
 
     @cached_property
-    def _columns(self) -> np.ndarray:
-        """Start x, y, direction, curvature and its change along each plan element, (m, 5)."""
-        rows = [(one.x, one.y, one.heading, one.k_from, (one.k_to - one.k_from) / one.length_m) for one in self.plan]
-        return np.array(rows)
+    def _joints(self) -> np.ndarray:
+        """Distances along the curve at which an element begins or ends in plan or in height, increasing."""
+        ends = [*(one.s_to for one in self.plan), *(one.s_to for one in self.vertical)]
+        return np.unique([*ends, *(one.s_from for one in self.vertical[:1])])
+
+    @cached_property
+    def _profile(self) -> np.ndarray:
+        """Start, height, gradient and its change along each element in height, (m, 4)."""
+        return np.array([(one.s_from, one.z, one.grade_from, one.curvature) for one in self.vertical])
+
+    @cached_property
+    def _ramps(self) -> np.ndarray:
+        """Start, cant and its change along each element of cant, (m, 3)."""
+        return np.array(
+            [(one.s_from, one.cant_from_m, (one.cant_to_m - one.cant_from_m) / one.length_m) for one in self.cant]
+        )
+
+    @cached_property
+    def _pieces(self) -> np.ndarray:
+        """Start, x, y, direction, curvature and its change along each plan element, or each piece of one, (m, 6)."""
+        rows = [(one.s_from, one.x, one.y, one.heading, one.k_from, one.k_to, one.length_m) for one in self.plan]
+        s, x, y, heading, k_from, k_to, length = np.array(rows).T
+        change = (k_to - k_from) / length
+        turn = length * (np.abs(k_from) + np.abs(k_to - k_from))
+        counts = np.maximum(np.ceil(turn / TURN_AT_ONCE_RAD), 1).astype(int)
+        of, first = np.repeat(np.arange(len(counts)), counts), np.cumsum(counts) - counts
+        part = (length / counts)[of]
+        u = (np.arange(len(of)) - first[of]) * part
+        bend = k_from[of] + change[of] * u
+        ahead = heading[of] + turned(u, k_from[of], change[of])
+        way = displaced(part, ahead, bend, change[of])
+        before = np.cumsum(way, axis=0) - way
+        xy = np.column_stack([x, y])[of] + before - before[first[of]]
+        return np.column_stack([s[of] + u, xy, ahead, bend, change[of]])
 
 
-def _within(elements: Sequence[Element], s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the element at each distance, and the distance from its start."""
-    starts = np.array([one.s_from for one in elements])
-    at = np.clip(np.searchsorted(starts, s, side="right") - 1, 0, len(starts) - 1)
-    return at, s - starts[at]
+def _at(rows: np.ndarray, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the row, which begins with its start, for each distance along the curve, and the distance from there."""
+    found = rows[np.maximum(np.searchsorted(rows[:, 0], s, side="right") - 1, 0)]
+    return found, s - found[:, 0]
 
 
 def chained(

@@ -6,7 +6,9 @@ shorter. A design file knows the distance along the track's own curve, and state
 
 from __future__ import annotations
 
+from bisect import bisect_left, bisect_right
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Optional
 
 import numpy as np
@@ -64,11 +66,15 @@ class Stations:
 
     def ahead(self, s: float) -> float:
         """Return the station of a place, metres; at a jump, that ahead."""
-        return next((one for one in reversed(self.pieces) if one.s <= s + SAME_PLACE_M), self.pieces[0]).at(s)
+        return self.pieces[max(bisect_right(self._starts, s + SAME_PLACE_M) - 1, 0)].at(s)
 
     def behind(self, s: float) -> float:
         """Return the station of a place, metres; at a jump, that behind."""
-        return next((one for one in reversed(self.pieces) if one.s < s - SAME_PLACE_M), self.pieces[0]).at(s)
+        return self.pieces[max(bisect_left(self._starts, s - SAME_PLACE_M) - 1, 0)].at(s)
+
+    @cached_property
+    def _starts(self) -> list[float]:
+        return [one.s for one in self.pieces]
 
 
 def stations_of(alignment: Alignment) -> Optional[Stations]:

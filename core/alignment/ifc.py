@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..progress import SILENT, Progress
 from .delivery import PROGRAM, Delivery, names
 from .elements import Alignment
 from .equations import Piece, Stations, stations_of
@@ -24,7 +25,7 @@ PRECISION_M = 1e-5
 """Distance below which viewers take two points for one, metres."""
 
 
-def write_ifc(path: Path, alignments: Sequence[Alignment], delivery: Delivery) -> None:
+def write_ifc(path: Path, alignments: Sequence[Alignment], delivery: Delivery, progress: Progress = SILENT) -> None:
     """Write alignments whose coordinates are in metres.
 
     Parameters
@@ -33,13 +34,14 @@ def write_ifc(path: Path, alignments: Sequence[Alignment], delivery: Delivery) -
     alignments : sequence of Alignment
         At least one; all in the same frame.
     delivery : Delivery
+    progress : Progress
 
     Raises
     ------
     OSError
         The file cannot be written.
     """
-    model = _Model(alignments[0].frame.origin, delivery)
+    model = _Model(alignments[0].frame.origin, delivery, progress)
     alone = [model.add(name, alignment) for name, alignment in zip(names(alignments), alignments)]
     model.relate("IfcRelAggregates", model.project, [*alone], "alignments")
     file = model.file
@@ -51,8 +53,8 @@ def write_ifc(path: Path, alignments: Sequence[Alignment], delivery: Delivery) -
 class _Model:
     """The file with its project, its place on the map, and the contexts of its curves."""
 
-    def __init__(self, origin: np.ndarray, delivery: Delivery) -> None:
-        self.file, self._origin, self._delivery = StepFile(), origin, delivery
+    def __init__(self, origin: np.ndarray, delivery: Delivery, progress: Progress) -> None:
+        self.file, self._origin, self._delivery = StepFile(progress), origin, delivery
         add = self.file.add
         metre = add("IfcSIUnit", DERIVED, Enum("LENGTHUNIT"), None, Enum("METRE"))
         radian = add("IfcSIUnit", DERIVED, Enum("PLANEANGLEUNIT"), None, Enum("RADIAN"))

@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..progress import SILENT, Progress
 from .delivery import PROGRAM, Delivery, names
 from .elements import Alignment, PlanElement, VerticalElement
 from .equations import Stations, stations_of
@@ -42,7 +43,13 @@ MM = 1000.0
 """Millimetres per metre."""
 
 
-def write_landxml(path: Path, alignments: Sequence[Alignment], delivery: Delivery, circles: bool = True) -> None:
+def write_landxml(
+    path: Path,
+    alignments: Sequence[Alignment],
+    delivery: Delivery,
+    circles: bool = True,
+    progress: Progress = SILENT,
+) -> None:
     """Write alignments whose coordinates are in metres.
 
     Parameters
@@ -52,6 +59,7 @@ def write_landxml(path: Path, alignments: Sequence[Alignment], delivery: Deliver
     delivery : Delivery
     circles : bool
         Whether curves of the profile are written as circles, as railways do, or as parabolas, as roads do.
+    progress : Progress
 
     Raises
     ------
@@ -73,12 +81,14 @@ def write_landxml(path: Path, alignments: Sequence[Alignment], delivery: Deliver
     ET.SubElement(root, "Application", {"name": PROGRAM, "version": delivery.version})
     parent = ET.SubElement(root, "Alignments")
     for name, alignment in zip(names(alignments), alignments):
-        _write_alignment(parent, name, alignment, delivery, circles)
+        _write_alignment(parent, name, alignment, delivery, circles, progress)
     ET.indent(root)
     ET.ElementTree(root).write(path, encoding="utf-8", xml_declaration=True)
 
 
-def _write_alignment(parent: ET.Element, name: str, alignment: Alignment, delivery: Delivery, circles: bool) -> None:
+def _write_alignment(
+    parent: ET.Element, name: str, alignment: Alignment, delivery: Delivery, circles: bool, progress: Progress
+) -> None:
     stations = stations_of(alignment)
     start = stations.pieces[0].station if stations and stations.pieces[0].rises else alignment.s_from
     internal = start - alignment.s_from
@@ -86,15 +96,15 @@ def _write_alignment(parent: ET.Element, name: str, alignment: Alignment, delive
     node = ET.SubElement(parent, "Alignment", {**facts, "state": "existing"})
     geometry = ET.SubElement(node, "CoordGeom", {"name": name})
     pieces = list(_split(alignment))
-    for piece, after in zip(pieces, [*pieces[1:], None]):
+    for piece, after in zip(progress.follow(pieces), [*pieces[1:], None]):
         _write_piece(geometry, alignment, piece, after, internal)
     if alignment.cant:
-        _write_cant(node, name, alignment, delivery, internal)
+        _write_cant(node, name, alignment, delivery, internal, progress)
     if stations:
         _write_equations(node, stations, internal)
     if alignment.vertical:
         profile = ET.SubElement(ET.SubElement(node, "Profile", {"name": name}), "ProfAlign", {"name": name})
-        _write_profile(profile, alignment, internal, circles)
+        _write_profile(profile, alignment, internal, circles, progress)
 
 
 def _split(alignment: Alignment) -> Iterator[PlanElement]:
@@ -158,11 +168,14 @@ def _intersection(start: np.ndarray, heading: float, end: np.ndarray, end_headin
     return start + ahead * np.array([math.cos(heading), math.sin(heading)])
 
 
-def _write_cant(parent: ET.Element, name: str, alignment: Alignment, delivery: Delivery, internal: float) -> None:
+def _write_cant(
+    parent: ET.Element, name: str, alignment: Alignment, delivery: Delivery, internal: float, progress: Progress
+) -> None:
     """Write the cant at the ends of its ramps; negative where the inner rail of the curve is higher."""
     gauge = {"gauge": _written(delivery.gauge_m), "rotationPoint": "center"}
     node = ET.SubElement(parent, "Cant", {"name": name, **gauge})
     for s, cant_m in _cant_knots(alignment):
+        progress.check()
         cw = _turns_right(alignment, s, cant_m)
         outer_m = cant_m if cw else -cant_m
         adverse = {"adverse": "true"} if outer_m < 0 else {}
@@ -208,11 +221,14 @@ def _write_equations(parent: ET.Element, stations: Stations, internal: float) ->
             ET.SubElement(parent, "StaEquation", {**place, **sense})
 
 
-def _write_profile(parent: ET.Element, alignment: Alignment, internal: float, circles: bool) -> None:
+def _write_profile(
+    parent: ET.Element, alignment: Alignment, internal: float, circles: bool, progress: Progress
+) -> None:
     """Write the points where tangents of the profile meet, with their curves."""
     first, last = alignment.vertical[0], alignment.vertical[-1]
     _write_meeting(parent, "PVI", alignment, first.s_from + internal, first.z, {})
     for before, one in zip([None, *alignment.vertical], alignment.vertical):
+        progress.check()
         if before is not None and _breaks(before, one):
             _write_meeting(parent, "PVI", alignment, one.s_from + internal, one.z, {})
         if one.type == "parabola":

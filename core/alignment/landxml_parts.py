@@ -14,6 +14,7 @@ from typing import Optional
 
 import numpy as np
 
+from ..design_numbers import CANT_MM, GRADE, LENGTH, NUMBER, RADIUS, Kind, check_turn, checked, quoted
 from ..errors import AlignmentFileError
 from ..frame import LocalFrame
 from ..progress import Progress
@@ -32,6 +33,9 @@ told, metres: a published file of a railway has an overlap of 21 mm."""
 MIN_BULGE_M = 0.005
 """Distance of a spiral's PI from its chord above which it shows to which side the spiral turns, metres: the PI may be
 rounded to millimetres."""
+
+STRAIGHT = ("inf", "infinity")
+"""Radii of a straight end of a spiral, in small letters."""
 
 TURNS = {"ccw": 1.0, "cw": -1.0}
 
@@ -64,6 +68,11 @@ class Part:
     k_to: float
     seen: float
 
+    @property
+    def chord_m(self) -> float:
+        """Distance of the end from the start."""
+        return math.dist(self.start, self.end)
+
 
 def parts_of(node: ET.Element, name: str) -> list[Part]:
     """Return the plan elements of an alignment.
@@ -86,8 +95,11 @@ def parts_of(node: ET.Element, name: str) -> list[Part]:
         if child.tag not in readers:
             raise AlignmentFileError(f"The {where} is neither line, arc nor clothoid: export an alignment of these.")
         part = readers[child.tag](child, where)
-        if part.length_m > SAME_PLACE_M:
-            found.append(part)
+        if part.length_m <= SAME_PLACE_M and part.chord_m <= SAME_PLACE_M:
+            continue
+        checked(part.length_m, LENGTH, f"The {where}", "length")
+        check_turn(part.length_m, part.k_from, part.k_to, f"The {where}")
+        found.append(part)
     if not found:
         raise AlignmentFileError(f"The {name} has no element: export it with its geometry.")
     return found
@@ -145,20 +157,23 @@ def _placed(part: Part, s: float, frame: LocalFrame, east_first: bool) -> PlanEl
 
 def _line(node: ET.Element, where: str) -> Part:
     start, end = (_place(node, name, where) for name in ("Start", "End"))
-    return Part(where, start, end, float(np.hypot(*(end - start))), 0.0, 0.0, 0.0)
+    _optional(node, "length", where, LENGTH if math.dist(start, end) > SAME_PLACE_M else NUMBER)
+    return Part(where, start, end, math.dist(start, end), 0.0, 0.0, 0.0)
 
 
 def _curve(node: ET.Element, where: str) -> Part:
     start, centre, end = (_place(node, name, where) for name in ("Start", "Center", "End"))
-    turn, seen_m = _turn(node, where), float(np.hypot(*(start - centre)))
-    radius_m = abs(_optional(node, "radius", where) or seen_m)
+    turn, seen_m = _turn(node, where), math.dist(start, centre)
+    if seen_m <= SAME_PLACE_M:
+        raise AlignmentFileError(f"The start of the {where} coincides with its centre: export the file again.")
+    radius_m = abs(_optional(node, "radius", where, RADIUS) or seen_m)
     if abs(radius_m - seen_m) > MAX_MISFIT_M:
         raise AlignmentFileError(
             f"The {where} states a radius of {radius_m:.3f} m, but its centre is {seen_m:.3f} m from its start: export "
             "the file again."
         )
-    half = math.asin(min(0.5 * float(np.hypot(*(end - start))) / radius_m, 1.0))
-    length_m = _optional(node, "length", where)
+    half = math.asin(min(0.5 * math.dist(start, end) / radius_m, 1.0))
+    length_m = _optional(node, "length", where, LENGTH)
     if length_m is None:
         length_m = 2.0 * half * radius_m
     # The centre of more than half a circle is on the other side of the chord.
@@ -180,7 +195,7 @@ def _spiral(node: ET.Element, where: str) -> Part:
     aside = chord[0] * (meet - start)[1] - chord[1] * (meet - start)[0]
     bulge_m = abs(float(aside)) / max(float(np.hypot(*chord)), SAME_PLACE_M)
     side = -_side(start, end, meet) if bulge_m > MIN_BULGE_M else 0.0
-    return Part(where, start, end, _needed(node, "length", where), k_from, k_to, side)
+    return Part(where, start, end, _needed(node, "length", where, LENGTH), k_from, k_to, side)
 
 
 def _side(start: np.ndarray, end: np.ndarray, place: np.ndarray) -> float:
@@ -220,6 +235,8 @@ def profile_of(node: ET.Element, name: str, progress: Progress) -> tuple[Vertica
     if (steps <= 0).any():
         raise AlignmentFileError(f"The profile of the {name} goes back at {s[int(np.argmin(steps))]:.2f} m: repair it.")
     grades = np.diff(z) / steps
+    steepest = int(np.argmax(np.abs(grades)))
+    checked(float(grades[steepest]), GRADE, f"The profile of the {name} at {s[steepest]:.2f} m", "gradient")
     lengths = [0.0, *(_curve_length(*one, name) for one in zip(nodes[1:-1], grades[:-1], grades[1:])), 0.0]
     return tuple(_tangents_and_curves(s, z, grades, lengths, name))
 
@@ -259,10 +276,10 @@ def _curve_length(node: ET.Element, before: float, after: float, name: str) -> f
     where = f"{node.tag} in the profile of the {name}"
     if node.tag == "PVI" or before == after:
         return 0.0
-    radius = _optional(node, "radius", where) if node.tag == "CircCurve" else None
+    radius = _optional(node, "radius", where, RADIUS) if node.tag == "CircCurve" else None
     if radius:
         return abs(radius) * abs(math.atan(after) - math.atan(before))
-    return abs(_needed(node, "length", where))
+    return _needed(node, "length", where, LENGTH)
 
 
 def cant_of(node: ET.Element, name: str, progress: Progress) -> tuple[CantElement, ...]:
@@ -302,7 +319,7 @@ def cant_of(node: ET.Element, name: str, progress: Progress) -> tuple[CantElemen
 
 def _signed_cant_m(node: ET.Element, where: str) -> float:
     """Return the cant, left rail minus right rail; adverse cant is negative, or positive and marked."""
-    outer_mm = _needed(node, "appliedCant", where)
+    outer_mm = _needed(node, "appliedCant", where, CANT_MM)
     if node.get("adverse") in ("true", "1"):
         outer_mm = -abs(outer_mm)
     return -_turn(node, where, "curvature") * outer_mm / MM + 0.0
@@ -316,7 +333,7 @@ def stations_of_file(node: ET.Element, name: str) -> Stations:
     for one in equations:
         s = _needed(one, "staInternal", name) - start
         rises = {"increasing": True, "decreasing": False}.get(one.get("staIncrement", ""), pieces[-1].rises)
-        if abs(s - pieces[-1].s) <= SAME_PLACE_M:
+        if s - pieces[-1].s <= SAME_PLACE_M:  # also where the alignment begins behind its first equation
             pieces.pop()
         pieces.append(Piece(s, _needed(one, "staAhead", name), rises))
     return Stations(tuple(pieces))
@@ -345,10 +362,9 @@ def _turn(node: ET.Element, where: str, name: str = "rot") -> float:
 
 
 def _radius(node: ET.Element, name: str, where: str) -> float:
-    radius_m = abs(_needed(node, name, where))
-    if radius_m == 0:
-        raise AlignmentFileError(f"The {where} has a {name} of 0: write INF where it is straight.")
-    return radius_m
+    """Return a radius; infinity where the element is straight."""
+    straight = (node.get(name) or "").strip().lstrip("+-").lower() in STRAIGHT
+    return math.inf if straight else abs(_needed(node, name, where, RADIUS))
 
 
 def _place(node: ET.Element, name: str, where: str) -> np.ndarray:
@@ -367,20 +383,21 @@ def _numbers(text: Optional[str], count: int, where: str) -> list[float]:
         found = [float(word) for word in (text or "").split()[:count]]
     except ValueError:
         found = []
-    if len(found) < count or not all(map(math.isfinite, found)):
-        raise AlignmentFileError(f"The {where} is not a list of numbers ({(text or '').strip()[:40]!r}): repair it.")
-    return found
+    if len(found) < count or any(map(math.isnan, found)):
+        raise AlignmentFileError(f"The {where} is not a list of numbers ({quoted((text or '').strip())}): repair it.")
+    return [checked(value, NUMBER, f"The {where}", "coordinate") for value in found]
 
 
-def _needed(node: ET.Element, name: str, where: str) -> float:
-    """Return a number that an element must state; INF is one."""
-    value = _optional(node, name, where)
+def _needed(node: ET.Element, name: str, where: str, kind: Kind = NUMBER) -> float:
+    """Return a number of a kind that an element must state."""
+    value = _optional(node, name, where, kind)
     if value is None:
         raise AlignmentFileError(f"The {where} does not state its {name}: export the file again.")
     return value
 
 
-def _optional(node: ET.Element, name: str, where: str) -> Optional[float]:
+def _optional(node: ET.Element, name: str, where: str, kind: Kind = NUMBER) -> Optional[float]:
+    """Return a number of a kind; None where it is not stated."""
     text = node.get(name)
     if text is None:
         return None
@@ -389,5 +406,5 @@ def _optional(node: ET.Element, name: str, where: str) -> Optional[float]:
     except ValueError:
         value = math.nan
     if math.isnan(value):
-        raise AlignmentFileError(f"The {where} states {text[:40]!r} as its {name}, which is not a number: repair it.")
-    return value
+        raise AlignmentFileError(f"The {where} states {quoted(text)} as its {name}, which is not a number: repair it.")
+    return checked(value, kind, f"The {where}", name)

@@ -14,6 +14,7 @@ from ..errors import AlignmentFileError
 from ..frame import ORIGIN_STEP, LocalFrame
 from ..progress import SILENT, Progress
 from .elements import Alignment, PlanElement
+from .extent import within_plan
 from .landxml_parts import Part, cant_of, parts_of, placed, profile_of, stations_of_file, with_kilometres
 from .xml_branches import branches
 
@@ -102,7 +103,8 @@ def _alignment(
     """Return an alignment with its profile, cant and kilometres."""
     stations = stations_of_file(node, where)
     profile, cant = profile_of(node, where, progress), cant_of(node, where, progress)
-    return with_kilometres(Alignment(track_id, frame, plan, profile, cant, node.get("name", "")), stations)
+    made = Alignment(track_id, frame, plan, profile, cant, node.get("name", ""))
+    return with_kilometres(within_plan(made, where, progress, float(node.get("staStart", "0"))), stations)
 
 
 def _track_ids(nodes: Sequence[ET.Element]) -> list[int]:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..design_numbers import KM, number_in, quoted
+from ..design_places import are_places
 from ..errors import RailExtractError
 from ..frame import LocalFrame
 from ..progress import SILENT, Progress
@@ -58,6 +59,26 @@ class PlacedAxes:
                 "of those whose field ambiguous is 1."
             )
         return found
+
+    def on_map(self, xy: np.ndarray, ids: Sequence[int], progress: Progress) -> np.ndarray:
+        """Return which places are on the map, (n,) bool, and warn of those that are not.
+
+        Parameters
+        ----------
+        xy : (n, 2) array
+            Coordinates of the system; NaN for a feature without a place, which needs no warning.
+        ids : sequence of int
+            Of the features.
+        progress : Progress
+        """
+        known = are_places(xy, self.unit_m)
+        lost = np.flatnonzero(~known & ~np.isnan(xy).any(axis=1))
+        if len(lost):
+            progress.warning(
+                f"{len(lost)} of {len(xy)} features have coordinates outside of any map, such as feature "
+                f"{ids[lost[0]]}: their kilometres are empty. Repair or delete them."
+            )
+        return known
 
     def along(
         self, tracks: Sequence[TrackGeometry], frame: LocalFrame, progress: Progress = SILENT
@@ -131,10 +152,10 @@ def km_of(value: object, field: str, name: str, feature: int) -> float:
     RailExtractError
         It is something else.
     """
-    km = read_km(value) if isinstance(value, str) else value
-    if isinstance(km, (int, float)) and math.isfinite(km):
-        return float(km)
+    km = read_km(value) if isinstance(value, str) else number_in(value)
+    if km is not None and KM.holds(km):
+        return km
     raise RailExtractError(
-        f"{name} has a row (feature {feature}) whose field {field} is {value!r} and no kilometre: correct it, or "
+        f"{name} has a row (feature {feature}) whose field {field} is {quoted(value)} and no kilometre: correct it, or "
         "delete the row."
     )

@@ -12,6 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import cKDTree
 
+from ..design_numbers import KM, LENGTH, NUMBER, checked
+from ..design_places import check_places
 from ..errors import RailExtractError
 from ..polyline import length_along
 from .axis import Axis
@@ -97,8 +99,9 @@ def make_axes(
     Raises
     ------
     RailExtractError
-        Nothing states kilometres, or what does contradicts itself.
+        Nothing states kilometres, or what does contradicts itself or is on no railway.
     """
+    _check(lines, start, posts)
     joined = [replace(line, name=line.name or str(number)) for number, line in enumerate(_joined(lines), start=1)]
     if (jumps or (start is not None and not posts)) and len(joined) > 1:
         what = "START_KM is" if start is not None and not posts else "JUMPS are"
@@ -117,6 +120,20 @@ def make_axes(
     if jumps:
         raise RailExtractError("JUMPS need START_KM or POSTS: M values of AXIS contain their jumps.")
     return _told([_by_measures(line) for line in joined])
+
+
+def _check(lines: Sequence[AxisLine], start: Start | None, posts: Sequence[Post]) -> None:
+    """Refuse lines, a start and posts that are on no railway; where they are read, kilometres are checked."""
+    for number, line in enumerate(lines, start=1):
+        where = f"The line {line.name or number} of AXIS"
+        check_places(line.xy, where)
+        for m in line.m[~(np.isnan(line.m) | (np.abs(line.m) <= NUMBER.high))][:1]:
+            checked(float(m), NUMBER, where, "M value")
+        checked(float(length_along(line.xy)[-1]), LENGTH, where, "length")
+    if start is not None:
+        checked(start.km, KM, "AXIS", "START_KM")
+    for post in posts:
+        check_places(post.xy[None], f"The post of km {post.km:g} in POSTS")
 
 
 def _told(axes: Sequence[Axis], more: Sequence[str] = ()) -> Axes:

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
 
+from ..progress import SILENT, Progress
+
 GUID_DIGITS = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz_$"
 """Digits in which IFC writes a GUID, by value."""
 
@@ -49,10 +51,11 @@ DERIVED = Enum("")
 
 
 class StepFile:
-    """Instances of a STEP file, in the order in which they are added."""
+    """Instances of a STEP file, in the order in which they are added; adding them can be cancelled."""
 
-    def __init__(self) -> None:
+    def __init__(self, progress: Progress = SILENT) -> None:
         self._lines: list[str] = []
+        self._progress = progress
 
     def add(self, entity: str, *attributes: Any) -> Ref:
         """Add an instance.
@@ -64,6 +67,7 @@ class StepFile:
         *attributes : object
             None, bool, number, str, `Whole`, `Ref`, `Enum`, `Measure`, or a sequence of these.
         """
+        self._progress.check()
         number = len(self._lines) + 1
         self._lines.append(f"#{number}={entity.upper()}({','.join(map(written, attributes))});\n")
         return Ref(number)

@@ -10,10 +10,14 @@ from typing import Any, Optional, TypeVar
 
 import numpy as np
 
+from ..design_numbers import CANT_MM, GRADE_PM, KM, NUMBER, RADIUS, WHOLE, checked, number_in, quoted
 from ..errors import ParameterError, RailExtractError
 from ..fields import ELEMENT_FIELDS
 from ..frame import ORIGIN_STEP, LocalFrame
+from ..progress import SILENT, Progress
 from .elements import Alignment, CantElement, Element, Figures, PlanElement, VerticalElement
+from .extent import within_plan
+from .km_text import read_km
 
 Row = Mapping[str, Any]
 
@@ -24,6 +28,17 @@ GON = 200.0 / math.pi
 
 LAYOUTS = (PlanElement.layout, VerticalElement.layout, CantElement.layout)
 
+UNREAD = ("length_m", "a_param", "rot", "azimuth_gon")
+"""Fields that follow from others."""
+
+KINDS = {
+    **dict.fromkeys(("track_id", "no"), WHOLE),
+    **dict.fromkeys(("r1_m", "r2_m", "r_fit_m", "r_round_m"), RADIUS),
+    **dict.fromkeys(("km_from", "km_to"), KM),
+    **dict.fromkeys(("grade1_pm", "grade2_pm"), GRADE_PM),
+    **dict.fromkeys(("cant1_mm", "cant2_mm"), CANT_MM),
+}
+"""What the numbers of some fields may be; those of the others are any of a design."""
 
 KEY_FIELDS = ("layout", "s_from", "s_to")
 """Fields by which an element table is recognized."""
@@ -44,12 +59,47 @@ def check_table(names: Collection[str], source: str) -> None:
         )
 
 
+def read_table(table: Iterable[Row], source: str) -> list[Row]:
+    """Return the rows of an element table with numbers for numbers that are written as text, after a check of all.
+
+    Parameters
+    ----------
+    table : iterable of mappings
+        Rows by the name of the field, with any values.
+    source : str
+        Name of the table, for messages.
+
+    Raises
+    ------
+    DesignNumberError, ParameterError
+        A value is not one that an element can have.
+    """
+    known = [one for one in ELEMENT_FIELDS if one.name not in UNREAD]
+    return [{one.name: _read(row, one.name, one.kind, f"{_where(row)} of {source}") for one in known} for row in table]
+
+
+def _read(row: Row, name: str, kind: type, where: str) -> Any:
+    """Return the value of a field; None where it is empty."""
+    value = row.get(name)
+    if kind is str:
+        return None if value is None else str(value)
+    number = read_km(value) if isinstance(value, str) and KINDS.get(name) is KM else None
+    number = number_in(value) if number is None else number
+    if number is None:
+        return None
+    if math.isnan(number) or (kind is int and not number.is_integer()):
+        what = "whole number" if kind is int else "number"
+        raise ParameterError(f"{where} has {quoted(value)} in the field {name}, which is not a {what}: correct it.")
+    return kind(checked(number, KINDS.get(name, NUMBER), where, name))
+
+
 def frame_of(table: Iterable[Row], system: tuple[Optional[str], float, float], source: str) -> LocalFrame:
     """Return the local frame of an element table.
 
     Parameters
     ----------
     table : iterable of mappings
+        From `read_table`.
     system : (str or None, float, float)
         Coordinate system as WKT, and its units in plan and in height, metres.
     source : str
@@ -60,7 +110,7 @@ def frame_of(table: Iterable[Row], system: tuple[Optional[str], float, float], s
     RailExtractError
         No element has a place.
     """
-    starts = [(row["x"], row["y"]) for row in table if _is_number(row.get("x")) and _is_number(row.get("y"))]
+    starts = [(row["x"], row["y"]) for row in table if None not in (row["x"], row["y"])]
     if not starts:
         raise RailExtractError(f"{source} has no element in plan with x and y: give a table with layout H.")
     crs_wkt, horizontal_unit_m, vertical_unit_m = system
@@ -68,35 +118,42 @@ def frame_of(table: Iterable[Row], system: tuple[Optional[str], float, float], s
     return LocalFrame(origin, horizontal_unit_m, vertical_unit_m, crs_wkt)
 
 
-def _is_number(value: Any) -> bool:
-    return isinstance(value, (int, float)) and math.isfinite(value)
-
-
 def rows(alignment: Alignment) -> list[dict[str, Any]]:
     """Return the rows of an alignment, unrounded: plan, then height, then cant, in order along the track."""
     layouts: tuple[Sequence[Element], ...] = (alignment.plan, alignment.vertical, alignment.cant)
-    return [_row(alignment, number, one) for elements in layouts for number, one in enumerate(elements, 1)]
+    starts = np.array([one.s_from for one in alignment.elements])
+    places, headings = alignment.frame.to_crs(alignment.xyz(starts)), alignment.headings(starts)
+    numbered = [(number, one) for elements in layouts for number, one in enumerate(elements, 1)]
+    return [
+        _row(alignment.track_id, number, one, place, heading)
+        for (number, one), place, heading in zip(numbered, places, headings.tolist())
+    ]
 
 
-def alignments(table: Iterable[Row], frame: LocalFrame) -> list[Alignment]:
+def alignments(table: Iterable[Row], frame: LocalFrame, progress: Progress = SILENT) -> list[Alignment]:
     """Return the alignments of an element table, in order of their track.
 
     Parameters
     ----------
     table : iterable of mappings
-        Rows by the name of the field, in any order; see `core.fields.ELEMENT_FIELDS`. Start, end, place and direction
-        of the start, type and radii are read in plan; height and gradients, or cant, in the other layouts.
+        From `read_table`, in any order; see `core.fields.ELEMENT_FIELDS`. Start, end, place and direction of the start,
+        type and radii are read in plan; height and gradients, or cant, in the other layouts.
     frame : LocalFrame
         Of the places in the alignments.
+    progress : Progress
 
     Raises
     ------
     ParameterError
         A row lacks a value or states an impossible one, or a track has no plan.
     """
-    known = [row for row in table if _layout(row)]
-    tracks = sorted({row.get("track_id") for row in known}, key=lambda number: (number is not None, number))
-    return [_alignment(number, [row for row in known if row.get("track_id") == number], frame) for number in tracks]
+    tracks: dict[Optional[int], list[Row]] = {}
+    for row in table:
+        progress.check()
+        if _layout(row):
+            tracks.setdefault(row["track_id"], []).append(row)
+    in_order = sorted(tracks, key=lambda number: (number is not None, number))
+    return [within_plan(_alignment(number, tracks[number], frame), _track(number), progress) for number in in_order]
 
 
 def _alignment(track_id: Optional[int], table: list[Row], frame: LocalFrame) -> Alignment:
@@ -107,7 +164,7 @@ def _alignment(track_id: Optional[int], table: list[Row], frame: LocalFrame) -> 
         _check_order(members)
     if "H" not in by_layout:
         raise ParameterError(
-            f"The element table has no row with layout H for track {track_id}: give it the elements in plan, too."
+            f"The element table has no row with layout H for {_track(track_id)}: give it the elements in plan, too."
         )
     return Alignment(
         track_id,
@@ -121,7 +178,7 @@ def _alignment(track_id: Optional[int], table: list[Row], frame: LocalFrame) -> 
 def _check_order(table: Sequence[Row]) -> None:
     """Check that elements which follow each other along the track are numbered in this order."""
     for before, after in zip(table, table[1:]):
-        first, second = (float(row["no"]) if _is_number(row.get("no")) else math.nan for row in (before, after))
+        first, second = (math.nan if row["no"] is None else row["no"] for row in (before, after))
         if first > second:
             raise ParameterError(
                 f"{_where(before)} starts at s_from = {float(before['s_from']):g} m, before element {second:g} at "
@@ -129,13 +186,11 @@ def _check_order(table: Sequence[Row]) -> None:
             )
 
 
-def _row(alignment: Alignment, number: int, element: Element) -> dict[str, Any]:
-    """Return the row of an element."""
-    place = alignment.frame.to_crs(alignment.xyz(np.array([element.s_from]))[0])
-    heading = float(alignment.headings(np.array([element.s_from]))[0])
+def _row(track_id: Optional[int], number: int, element: Element, place: np.ndarray, heading: float) -> dict[str, Any]:
+    """Return the row of an element, given the place, (3,), and the direction of its start."""
     row = dict.fromkeys((one.name for one in ELEMENT_FIELDS), None)
     row.update(
-        track_id=alignment.track_id,
+        track_id=track_id,
         no=number,
         layout=element.layout,
         type=element.type,
@@ -184,12 +239,12 @@ def _layout(row: Row) -> Optional[str]:
 def _plan_element(row: Row, frame: LocalFrame) -> PlanElement:
     """Return the element of a row in plan; its type decides which radii count."""
     kind, place = row.get("type"), frame.to_local(np.array([_needed(row, "x"), _needed(row, "y"), 0.0]))
-    ends = {"line": (None, None), "arc": (_edited_radius(row),) * 2, "clothoid": (row.get("r1_m"), row.get("r2_m"))}
+    ends = {"line": (None, None), "arc": (_edited_radius(row),) * 2, "clothoid": (row["r1_m"], row["r2_m"])}
     if kind not in ends:
         raise ParameterError(f"{_where(row)} has the type {kind!r}: in plan, write line, arc or clothoid.")
     if kind != "line" and ends[kind] == (None, None):
         raise ParameterError(f"{_where(row)} is of type {kind} and has no radius: fill one, or make it a line.")
-    k_from, k_to = (_bend(row, radius) for radius in ends[kind])
+    k_from, k_to = (_bend(radius) for radius in ends[kind])
     start = *_extent(row), float(place[0]), float(place[1]), _needed(row, "heading")
     return PlanElement(*start, k_from, k_to, _figures(row))
 
@@ -201,7 +256,7 @@ def _vertical_element(row: Row, frame: LocalFrame) -> VerticalElement:
     grade_from, grade_to = _ends(row, ("grade", "parabola"), "grade1_pm", "grade2_pm")
     radius = _edited_radius(row)
     if row.get("type") == "parabola" and radius is not None and (grade_from == grade_to or _is_fitted(row)):
-        grade_to = grade_from + length_m * _bend(row, radius)
+        grade_to = grade_from + length_m * _bend(radius)
     return _checked(row, VerticalElement(s_from, length_m, z, grade_from, grade_to, _figures(row)), "fill r1_m")
 
 
@@ -240,19 +295,15 @@ def _extent(row: Row) -> tuple[float, float]:
     return s_from, s_to - s_from
 
 
-def _edited_radius(row: Row) -> Any:
+def _edited_radius(row: Row) -> Optional[float]:
     """Return the radius of an arc: of two that differ, the one that is not as it was fitted."""
     first, second, fitted = (row.get(name) for name in ("r1_m", "r2_m", "r_fit_m"))
     return second if second is not None and (first is None or first == fitted) else first
 
 
-def _bend(row: Row, radius: Any) -> float:
+def _bend(radius: Optional[float]) -> float:
     """Return the curvature for a radius; 0 where it is empty."""
-    if radius is None:
-        return 0.0
-    if not math.isfinite(float(radius)) or float(radius) == 0.0:
-        raise ParameterError(f"{_where(row)} has the radius {radius}: leave it empty where the track is straight.")
-    return 1.0 / float(radius)
+    return 0.0 if radius is None else 1.0 / radius
 
 
 def _figures(row: Row) -> Figures:
@@ -262,12 +313,17 @@ def _figures(row: Row) -> Figures:
 
 def _needed(row: Row, name: str) -> float:
     """Return a number that a row must have."""
-    value: Any = row.get(name)
-    if _is_number(value):
+    value = row[name]
+    if value is not None:
         return float(value)
     raise ParameterError(f"{_where(row)} has no value in the field {name}: fill it, or remove the row.")
 
 
 def _where(row: Row) -> str:
     """Name a row in a message."""
-    return f"The element {row.get('no')} of layout {row.get('layout')} of track {row.get('track_id')}"
+    no, layout, track = (quoted(row.get(name)).strip("'") for name in ("no", "layout", "track_id"))
+    return f"The element {no} of layout {layout} of track {track}"
+
+
+def _track(track_id: Optional[int]) -> str:
+    return f"track {track_id}"

@@ -64,6 +64,7 @@ class _Gardener:
         self._done: list[ET.Element] = []
         self._open: list[ET.Element] = []
         self._last: ET.Element | None = None  # which text follows
+        self._text: list[str] = []
         self._depth = self._nodes = self._characters = 0
         self._parser = expat.ParserCreate()
         self._parser.buffer_text = True
@@ -98,7 +99,9 @@ class _Gardener:
             raise AlignmentFileError(f"{self._name} is XML of another kind: its root is {name[:40]}, not {self._root}.")
         if self._open or (self._depth == 1 and name in self._names):
             self._nodes += 1
+            self._characters += sum(map(len, attributes.values()))
             self._check_size()
+            self._end_text()
             self._last = ET.Element(name, attributes)
             if self._open:
                 self._open[-1].append(self._last)
@@ -109,7 +112,7 @@ class _Gardener:
         self._depth -= 1
         if self._open:
             branch = self._open.pop()
-            self._last = None
+            self._end_text()
             if not self._open:
                 self._done.append(branch)
 
@@ -117,7 +120,13 @@ class _Gardener:
         if self._last is not None:
             self._characters += len(text)
             self._check_size()
-            self._last.text = (self._last.text or "") + text
+            self._text.append(text)
+
+    def _end_text(self) -> None:
+        """Give the last node its text, whose parts come in turn."""
+        if self._last is not None and self._text:
+            self._last.text = "".join(self._text)
+        self._last, self._text = None, []
 
     def _check_size(self) -> None:
         if self._nodes > MAX_NODES or self._characters > MAX_CHARACTERS or self._depth > MAX_DEPTH:

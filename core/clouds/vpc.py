@@ -22,7 +22,7 @@ def list_tiles(catalogue: Path) -> tuple[Path, ...]:
         The file can't be read as a virtual point cloud, names no tiles, or names one that does not exist.
     """
     try:
-        items = json.loads(catalogue.read_text(encoding="utf-8"))["features"]
+        items = json.loads(catalogue.read_text(encoding="utf-8-sig"))["features"]
         # Other assets, such as the overview, repeat points of the tiles. Nothing is looked up a million times.
         hrefs = dict.fromkeys(item["assets"]["data"]["href"] for item in items)
         tiles = tuple(catalogue.parent / href for href in hrefs)

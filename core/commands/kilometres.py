@@ -16,6 +16,7 @@ from ..alignment.placed_axes import AXIS_IN_DEGREES, NAME_FIELDS, PlacedAxes, ch
 from ..alignment.stationing import Jump
 from ..alignment.stations import Axes, AxisLine, Post, Start, make_axes
 from ..clouds.crs import is_geographic, parse_crs, units
+from ..design_places import are_places
 from ..disk import Destination
 from ..errors import CrsError, MissingError, ParameterError
 from ..fields import EXTENT_FIELDS, STATION_FIELDS, Field
@@ -23,7 +24,10 @@ from ..output.geopackage import geometries_in
 from ..output.writing import column_of, write_table
 from ..progress import Progress
 from ..rails import Kilometres
-from .vectors import LAYER, Features, read_features
+from .vectors import LAYER, Features, explained, read_features
+
+FAR = np.full(2, np.inf)
+"""Place of a feature that is not on the map."""
 
 
 def _with_measures(features: Features, file: str) -> Features:
@@ -81,14 +85,20 @@ def located(
     progress : Progress
     """
     shapes = features.in_plane(crs_wkt)
-    places = np.array([_place(shape) for shape in shapes]).reshape(-1, 2)
-    known = np.isfinite(places).all(axis=1)
+    bounds = shapely.bounds(shapes)
+    far = ~are_places(bounds, axes.unit_m) & ~np.array(
+        [shape is None or shape.is_empty for shape in shapes], dtype=bool
+    )
+    with explained(features.option):
+        places = np.array([FAR if lost else _place(shape) for shape, lost in zip(shapes, far)]).reshape(-1, 2)
+    known = axes.on_map(places, features.ids.tolist(), progress)
     kilometres = Kilometres.empty(len(shapes))
     kilometres.put(known, axes.locate(places[known], progress))
     columns = [getattr(kilometres, field.name) for field in STATION_FIELDS]
     if all(shape is None or "Point" in shape.geom_type for shape in shapes):
         return STATION_FIELDS, columns
     xy, numbers = shapely.get_coordinates(shapes, return_index=True)
+    xy, numbers = xy[known[numbers]], numbers[known[numbers]]
     extents, km = np.full((len(shapes), 2), np.nan), axes.kilometres(xy, progress).km
     np.fmin.at(extents[:, 0], numbers, km)
     np.fmax.at(extents[:, 1], numbers, km)
@@ -111,7 +121,7 @@ def _axis_lines(features: Features, crs_wkt: str | None, unit_m: float) -> Itera
     named = next((name for name in NAME_FIELDS if name in features.columns), None)
     for row, shape, moved in zip(features.rows(), features.shapes, features.in_plane(crs_wkt)):
         for part, placed in zip(shapely.get_parts(shape), shapely.get_parts(moved)):
-            if part.geom_type == "LineString" and part.length > 0:
+            if part.geom_type == "LineString" and part.length != 0:  # that of a damaged line is not a number
                 m = shapely.get_coordinates(part, include_m=True)[:, 2]
                 yield AxisLine(str((named and row[named]) or ""), shapely.get_coordinates(placed) * unit_m, m)
 

@@ -85,8 +85,9 @@ def _fit(args: argparse.Namespace) -> None:
     outputs = destinations_of(args, FIT_OUTPUTS)
     settings = FitParameters(args.tolerance / 1000.0, args.min_length, args.transitions, not args.no_round)
     tracks, frame = vectors.read_tracks(args.lines, args.quality, args.rails)
-    fixed = {} if args.fixed is None else {one.track_id: one for one in vectors.read_elements(args.fixed, "--fixed")}
-    fits = fit_tracks(tracks, frame, settings, fixed, Estimating(Console()))
+    progress = Estimating(Console())
+    held = [] if args.fixed is None else vectors.read_elements(args.fixed, "--fixed", progress=progress)
+    fits = fit_tracks(tracks, frame, settings, {one.track_id: one for one in held}, progress)
     made = [elements_layer([fit.alignment for fit in fits])]
     if "deviations" in outputs:
         made.append(stations_layer(DEVIATIONS, [fit.deviations for fit in fits]))
@@ -116,8 +117,9 @@ def _export_alignment(args: argparse.Namespace) -> None:
     check_format(args.output)
     standard = resolve(args.standard, args.gauge, args.head_width)
     destination = destination_of("output", args.output, tuple(FORMATS))
-    alignments = vector_module("ELEMENTS").read_elements(args.elements, "ELEMENTS", args.crs)
-    check_designs(alignments, Estimating(Console()))
+    progress = Estimating(Console())
+    alignments = vector_module("ELEMENTS").read_elements(args.elements, "ELEMENTS", args.crs, progress)
+    check_designs(alignments, progress)
     with destination.replacing() as new:
         write_designs(new, alignments, standard, args.vertical_curves == CURVES[0], VERSION)
     _print_count(alignments)

@@ -18,12 +18,14 @@ from ..airborne.survey import Guide, gauge_of
 from ..alignment.cant_of_rails import cant_of_rails
 from ..alignment.elements import Alignment
 from ..alignment.measured import Track, stations_by_track, with_cant
-from ..alignment.table import alignments, check_table, frame_of
+from ..alignment.table import alignments, check_table, frame_of, read_table
 from ..clouds.crs import import_pyproj, is_geographic, name_of, parse_crs, same_plane, units
 from ..clouds.mask import Mask
 from ..comparison.tracks import SurveyedLine
+from ..design_places import check_line, check_places
 from ..errors import CrsError, MissingError, ParameterError
 from ..frame import ORIGIN_STEP, LocalFrame
+from ..progress import SILENT, Progress
 from ..rails import RailLine
 
 LAYER = "|layername="
@@ -102,7 +104,7 @@ class Features:
         if not (crs_wkt and self.crs_wkt):
             return self.shapes
         change = import_pyproj().Transformer.from_crs(parse_crs(self.crs_wkt), parse_crs(crs_wkt), always_xy=True)
-        with _explained(self.option):
+        with explained(self.option):
             return shapely.transform(self.shapes, lambda xy: np.column_stack(change.transform(*xy.T)))
 
     def parts(self, crs_wkt: str | None, *kinds: str) -> Iterator[tuple[int, shapely.Geometry]]:
@@ -114,6 +116,37 @@ class Features:
             known = not part.is_empty and np.isfinite(shapely.get_coordinates(part)).all()
             if part.geom_type in kinds and known and (part.geom_type == "Point" or part.length > 0):
                 yield int(number), part
+
+    def checked(self) -> Features:
+        """Return these features if all their coordinates are on the map.
+
+        Raises
+        ------
+        DesignNumberError
+        """
+        unit_m = _unit_m(self.crs_wkt)
+        for feature, bounds in zip(self.ids, shapely.bounds(self.shapes).reshape(-1, 2, 2)):
+            if not np.isnan(bounds).all():
+                check_places(bounds, f"{self.option} (feature {feature})", unit_m)
+        return self
+
+    def guides(self, crs_wkt: str | None) -> Iterator[tuple[int, np.ndarray]]:
+        """Yield row and vertices, (k, 2), of the lines that show places along tracks; see `parts`.
+
+        Raises
+        ------
+        DesignNumberError
+            A line leads to a place that is not on the map.
+        """
+        for number, line in self.checked().parts(crs_wkt, "LineString"):
+            where = f"{self.option} (feature {self.ids[number]})"
+            yield number, check_line(shapely.get_coordinates(line), where, _unit_m(crs_wkt or self.crs_wkt))
+
+
+def _unit_m(crs_wkt: str | None) -> float:
+    """Return the unit of a coordinate system in plan; that of degrees counts as 1."""
+    crs = parse_crs(crs_wkt) if crs_wkt else None
+    return 1.0 if crs is None or is_geographic(crs) else units(crs)[0]
 
 
 def read_features(file: str | Path, option: str = "", columns: Sequence[str] | None = None) -> Features:
@@ -136,7 +169,7 @@ def read_features(file: str | Path, option: str = "", columns: Sequence[str] | N
     path, _, layer = str(file).partition(LAYER)
     if Path(path).is_fifo():
         raise ParameterError(f"{path} is a pipe, not a file: give a GeoPackage or GeoJSON file.")
-    with _explained(f"{option} {file}".strip()), warnings.catch_warnings():
+    with explained(f"{option} {file}".strip()), warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # of the M values, which only an axis needs
         chosen = {"layer": layer or None, "columns": columns}
         meta, ids, shapes, values = pyogrio.raw.read(Path(path), return_fids=True, **chosen)
@@ -145,7 +178,7 @@ def read_features(file: str | Path, option: str = "", columns: Sequence[str] | N
 
 
 @contextmanager
-def _explained(name: str) -> Iterator[None]:
+def explained(name: str) -> Iterator[None]:
     """Turn what GDAL, PROJ and GEOS raise because of a file into a `ParameterError` that names the file."""
     try:
         yield
@@ -163,8 +196,7 @@ def read_lines(file: Path, crs_wkt: str | None) -> list[np.ndarray]:
     ParameterError
         The file can't be read, or has no lines.
     """
-    found = read_features(file, columns=()).parts(crs_wkt, "LineString")
-    lines = [shapely.get_coordinates(line) for _, line in found]
+    lines = [line for _, line in read_features(file, columns=()).guides(crs_wkt)]
     if not lines:
         raise ParameterError(f"{file} has no lines: give lines along the tracks.")
     return lines
@@ -185,11 +217,11 @@ def read_guides(file: Path, crs_wkt: str | None) -> list[Guide]:
     guides = [
         Guide(
             int(features.ids[number]),
-            shapely.get_coordinates(line),
+            line,
             gauge_of(rows[number].get("gauge")),
             *(_word(rows[number].get(name)) for name in ("name", "ref")),
         )
-        for number, line in features.parts(crs_wkt, "LineString")
+        for number, line in features.guides(crs_wkt)
     ]
     if not guides:
         raise ParameterError(f"{file} has no lines: give lines along the tracks.")
@@ -204,8 +236,9 @@ def read_seeds(file: Path, crs_wkt: str | None) -> list[np.ndarray]:
     ParameterError
         The file can't be read, or has neither points nor lines.
     """
-    found = read_features(file, columns=()).parts(crs_wkt, "Point", "LineString")
-    seeds = [shapely.get_coordinates(seed) for _, seed in found]
+    features = read_features(file, columns=())
+    points = [shapely.get_coordinates(seed) for _, seed in features.checked().parts(crs_wkt, "Point")]
+    seeds = [*points, *(line for _, line in features.guides(crs_wkt))]
     if not seeds:
         raise ParameterError(f"{file} has neither points nor lines: give places on railheads.")
     return seeds
@@ -219,10 +252,10 @@ def read_mask(file: Path, crs_wkt: str | None) -> Mask:
     ParameterError
         The file can't be read, or has no polygons.
     """
-    areas = [area for _, area in read_features(file, columns=()).parts(crs_wkt, "Polygon") if area.area > 0]
+    areas = [area for _, area in read_features(file, columns=()).checked().parts(crs_wkt, "Polygon") if area.area > 0]
     if not areas:
         raise ParameterError(f"{file} has no polygons: give polygons around the tracks.")
-    with _explained(str(file)):
+    with explained(str(file)):
         united = shapely.get_parts(shapely.union_all(shapely.make_valid(areas)))
     return Mask.of([shapely.get_coordinates(ring) for ring in shapely.get_rings(united)])
 
@@ -249,7 +282,7 @@ def read_tracks(
     ], frame
 
 
-def read_elements(file: str, option: str, crs: str | None = None) -> list[Alignment]:
+def read_elements(file: str, option: str, crs: str | None = None, progress: Progress = SILENT) -> list[Alignment]:
     """Read the alignments of an element table; `crs` is that of a table without geometries.
 
     Raises
@@ -259,9 +292,9 @@ def read_elements(file: str, option: str, crs: str | None = None) -> list[Alignm
     """
     found = read_features(file, option)
     check_table(found.columns, option)
-    rows = found.rows()
+    rows = read_table(found.rows(), option)
     stated = found.crs_wkt or (parse_crs(crs).to_wkt() if crs else None)
-    return alignments(rows, frame_of(rows, replace(found, crs_wkt=stated).system, option))
+    return alignments(rows, frame_of(rows, replace(found, crs_wkt=stated).system, option), progress)
 
 
 def read_survey(file: str, option: str, frame: LocalFrame | None) -> tuple[list[SurveyedLine], LocalFrame]:

@@ -37,12 +37,18 @@ def load_arrays(path: Path) -> dict[str, np.ndarray]:
         with zipfile.ZipFile(path) as archive:
             if sum(member.file_size for member in archive.infolist()) > MAX_BYTES:
                 raise ValueError("too large")
-            return {name[: -len(SUFFIX)]: _array(archive.read(name)) for name in archive.namelist()}
+            return {member.filename[: -len(SUFFIX)]: _array(_bytes(archive, member)) for member in archive.infolist()}
     except FileNotFoundError:
         raise ModelError(f"The weights file {path} is missing: reinstall the plugin.") from None
     except Exception as error:
         # A damaged archive raises any of a dozen errors of zipfile, zlib, numpy and struct.
         raise ModelError(f"The weights file {path} cannot be read: reinstall the plugin.") from error
+
+
+def _bytes(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> bytes:
+    """Unpack no more of a member than the archive states; one that holds more is damaged, as its checksum shows."""
+    with archive.open(member) as file:
+        return file.read(member.file_size)
 
 
 def _array(data: bytes) -> np.ndarray:

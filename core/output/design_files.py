@@ -12,7 +12,7 @@ from ..alignment.landxml import write_landxml
 from ..clouds.crs import codes_and_names, lies_in_area, name_of, parse_crs
 from ..errors import AlignmentFileError, CrsError, ParameterError
 from ..frame import LocalFrame
-from ..progress import Progress
+from ..progress import SILENT, Progress
 from ..standards import RailStandard
 from .exchange import write_alignments
 
@@ -54,7 +54,12 @@ def check_designs(alignments: Sequence[Alignment], progress: Progress) -> None:
 
 
 def write_designs(
-    path: Path, alignments: Sequence[Alignment], standard: RailStandard, circles: bool, version: str
+    path: Path,
+    alignments: Sequence[Alignment],
+    standard: RailStandard,
+    circles: bool,
+    version: str,
+    progress: Progress = SILENT,
 ) -> None:
     """Write alignments in the format that the name of a file states.
 
@@ -68,17 +73,18 @@ def write_designs(
         Whether curves of the profile are circles in LandXML; else they are parabolas.
     version : str
         Of this program.
+    progress : Progress
     """
     kind = FORMATS[path.suffix.lower()]
     wkt = alignments[0].frame.crs_wkt
     epsg, system, heights = codes_and_names(parse_crs(wkt)) if wkt else (None, "", "")
     delivery = Delivery(standard.gauge_m, standard.head_width_m, epsg, system, heights, version)
     if kind == "LandXML":
-        write_landxml(path, alignments, delivery, circles)
+        write_landxml(path, alignments, delivery, circles, progress)
     elif kind == "IFC":
-        write_ifc(path, alignments, delivery)
+        write_ifc(path, alignments, delivery, progress)
     else:
-        write_alignments(path, alignments)
+        write_alignments(path, alignments, progress)
 
 
 def check_place(name: str, frame: LocalFrame, east_first: bool, progress: Progress) -> None:

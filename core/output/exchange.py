@@ -23,6 +23,7 @@ from ..clouds.crs import parse_crs
 from ..fields import Field
 from ..frame import LocalFrame
 from ..polyline import length_along
+from ..progress import SILENT, Progress
 
 VERTICES = "_points.csv"
 """Ending of the names of CSV files with one row per vertex."""
@@ -141,7 +142,7 @@ def _written(place: np.ndarray) -> list[str]:
     return ["" if np.isnan(value) else f"{value:.{DECIMALS}f}" for value in place]
 
 
-def write_alignments(path: Path, alignments: Sequence[Alignment]) -> None:
+def write_alignments(path: Path, alignments: Sequence[Alignment], progress: Progress = SILENT) -> None:
     """Write alignments as a DXF file: a 3D polyline for each, and a point with a text where an element begins.
 
     The curve of track 7 is on the layer ALIGNMENT_7, the elements are on PLAN_7, PROFILE_7 and CANT_7.
@@ -154,14 +155,20 @@ def write_alignments(path: Path, alignments: Sequence[Alignment]) -> None:
     entities: list[Entity] = []
     for alignment in alignments:
         track = "" if alignment.track_id is None else f"_{alignment.track_id}"
-        curve = alignment.frame.to_crs(alignment.drawn(alignment.s_from, alignment.s_to))
+        curve = _with_heights(alignment.frame.to_crs(alignment.drawn(alignment.s_from, alignment.s_to)))
         layer = f"ALIGNMENT{track}"
         entities.append((layer, _polyline(curve, layer, ())))
         for one in alignment.elements:
             layer = f"{LAYOUTS[one.layout]}{track}"
             entities.append((layer, _element_point(alignment, one, layer)))
     with path.open("w", encoding="ascii", errors="replace", newline="\r\n") as file:
-        _put_drawing(file, entities)
+        _put_drawing(file, entities, progress)
+
+
+def _with_heights(curve: np.ndarray) -> np.ndarray:
+    """Return the vertices, (n, 3), whose heights are known; all of them if none is: at 0, they would make cliffs."""
+    known = np.isfinite(curve[:, 2])
+    return curve[known] if known.any() else curve
 
 
 def _element_point(alignment: Alignment, one: Element, layer: str) -> Iterator[tuple[int, Any]]:
@@ -207,7 +214,7 @@ def _write_dxf(file: TextIO, shapes: Sequence[Shape], fields: Sequence[Field], k
     _put_drawing(file, entities)
 
 
-def _put_drawing(file: TextIO, entities: Sequence[Entity]) -> None:
+def _put_drawing(file: TextIO, entities: Sequence[Entity], progress: Progress = SILENT) -> None:
     """Write a DXF file of release 12."""
     groups: list[tuple[int, Any]] = [(0, "SECTION"), (2, "HEADER"), (9, "$ACADVER"), (1, "AC1009"), (0, "ENDSEC")]
     groups += [(0, "SECTION"), (2, "TABLES")]
@@ -218,6 +225,7 @@ def _put_drawing(file: TextIO, entities: Sequence[Entity]) -> None:
     groups += [(0, "ENDSEC"), (0, "SECTION"), (2, "ENTITIES")]
     _put(file, groups)
     for _, entity in entities:
+        progress.check()
         _put(file, entity)
     _put(file, [(0, "ENDSEC"), (0, "EOF")])
 
@@ -268,7 +276,12 @@ def _colour(layer: str) -> int:
 
 
 def _put(file: TextIO, groups: Iterable[tuple[int, Any]]) -> None:
-    """Write groups: a code and a value, each on its own line."""
-    file.writelines(
-        f"{code:3d}\n{f'{value:.{DECIMALS}f}' if isinstance(value, float) else value}\n" for code, value in groups
-    )
+    """Write groups: a code and a value, each on its own line; a line break in a text would begin another group."""
+    file.writelines(f"{code:3d}\n{_group_value(value)}\n" for code, value in groups)
+
+
+def _group_value(value: Any) -> str:
+    """Write the value of a group, in which a control character of a text becomes a blank."""
+    if isinstance(value, float):
+        return f"{value:.{DECIMALS}f}"
+    return "".join(one if one.isprintable() else " " for one in str(value))

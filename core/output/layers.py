@@ -27,6 +27,7 @@ from ..fields import (
     Product,
 )
 from ..frame import LocalFrame
+from ..progress import SILENT, Progress
 from ..rails import Centerline, RailLine, RailNetwork, TrackGeometry
 from ..report import Finding, list_findings
 
@@ -146,11 +147,15 @@ def stops_layer(stops: Sequence[Stop]) -> Layer:
     return Layer(STOPS, columns, [stop.xyz for stop in stops])
 
 
-def elements_layer(alignments: Sequence[Alignment]) -> Layer:
-    """Make a layer of the element tables of alignments, each element with its curve."""
+def elements_layer(alignments: Sequence[Alignment], progress: Progress = SILENT) -> Layer:
+    """Make a layer of the element tables of alignments, each element with its curve; it can be cancelled."""
     table = [row for alignment in alignments for row in rows(alignment)]
     columns = [[row[field.name] for row in table] for field in ELEMENTS.fields]
-    curves = [alignment.drawn(one.s_from, one.s_to) for alignment in alignments for one in alignment.elements]
+    curves = []
+    for alignment in alignments:
+        for one in alignment.elements:
+            progress.check()
+            curves.append(alignment.drawn(one.s_from, one.s_to))
     return Layer(ELEMENTS, columns, curves)
 
 

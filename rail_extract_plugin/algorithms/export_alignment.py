@@ -20,8 +20,8 @@ from ..systems import prepare_system
 from .base import ALIGNMENT_WORDS, RAIL_WORDS, RailAlgorithm
 from .toolbox_groups import ALIGNMENT
 
-READING = 0.5
-"""Fraction of the progress bar at which the table is read."""
+READING, CHECKED = 0.5, 0.7
+"""Fractions of the progress bar at which the table is read, and checked."""
 
 
 @dataclass(frozen=True)
@@ -85,9 +85,9 @@ class ExportAlignment(RailAlgorithm):
         from ..reading.element_tables import read_elements
 
         alignments, _ = read_elements(job.source, job.crs, progress.span(0, READING))
-        check_designs(alignments, progress.span(READING, 1))
+        check_designs(alignments, progress.span(READING, CHECKED))
         destination = self.destinations.get("OUTPUT") or Destination.at(job.path)
         with destination.replacing() as new:
-            write_designs(new, alignments, job.standard, job.circles, VERSION)
+            write_designs(new, alignments, job.standard, job.circles, VERSION, progress.span(CHECKED, 1))
         count = sum(len(alignment.elements) for alignment in alignments)
         return {"OUTPUT": str(job.path), "ALIGNMENT_COUNT": len(alignments), "ELEMENT_COUNT": count}

@@ -102,7 +102,7 @@ class FitAlignment(RailAlgorithm):
         courses = list(zip(alignments, deviations))
         name, facts = job.tracks.sourceName(), {"Command": job.command}
         makers = {
-            "ELEMENTS": lambda: elements_layer(alignments),
+            "ELEMENTS": lambda: elements_layer(alignments, progress),
             "DEVIATIONS": lambda: stations_layer(DEVIATIONS, deviations),
         }
         writers = {

@@ -117,7 +117,7 @@ class ImportAlignment(RailAlgorithm):
         deviations = [one for _, one in courses]
         facts = {"LandXML file": job.path.name, "Command": job.command}
         makers = {
-            "ELEMENTS": lambda: elements_layer(alignments),
+            "ELEMENTS": lambda: elements_layer(alignments, progress),
             "AXIS": lambda: axes_layer(alignments),
             "DEVIATIONS": lambda: stations_layer(DEVIATIONS, deviations),
         }

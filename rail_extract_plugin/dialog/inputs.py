@@ -17,10 +17,11 @@ from qgis.core import (
 )
 
 from ...core.alignment.km_text import HECTOMETRES, NOTATIONS
+from ...core.design_numbers import KM
 from ...core.parameters import AIRBORNE_CLASSES
 from ...core.standards import RAIL_CLASS
 from .cloud_parameter import CloudParameter
-from .definitions import ANY, LINE, POINT, TABLE, UNBOUNDED, Definitions, advanced, choice, helped, number
+from .definitions import ANY, LINE, POINT, TABLE, Definitions, advanced, choice, helped, number
 from .parameter_values import DIRECTIONS, INCREASING
 
 
@@ -271,7 +272,7 @@ def axis(optional: bool) -> Definitions:
             "another coordinate system it is transformed.",
         ),
         show(
-            number("START_KM", "Start of the axis [km]", minimum=-UNBOUNDED, optional=True, decimals=6),
+            number("START_KM", "Start of the axis [km]", None, KM.low, KM.high, optional=True, decimals=6),
             "Kilometre at the first vertex of the axis, for an axis that is a single line. It overrides M values.",
         ),
         advanced(

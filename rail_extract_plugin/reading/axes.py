@@ -31,7 +31,7 @@ from ...core.alignment.placed_axes import (
 from ...core.alignment.stationing import Jump
 from ...core.alignment.stations import Axes, AxisLine, Post, Start, make_axes
 from ...core.clouds.crs import parse_crs, units
-from ...core.errors import CrsError, MissingError, RailExtractError
+from ...core.errors import CrsError, MissingError
 from .line_layers import CHORD_TOLERANCE_M, GEOMETRY_AS_IT_IS, transform, value_of, wkt_of
 
 
@@ -106,15 +106,23 @@ def shapes_in(
     CrsError
         A geometry can't be transformed.
     """
-    change = QgsCoordinateTransform(source.sourceCrs(), crs, context.transformContext())
-    for feature in source.getFeatures(QgsFeatureRequest(), GEOMETRY_AS_IT_IS):
-        shape = QgsGeometry(feature.geometry())
-        if not transform(shape, change):
+    for feature, shape in moved_shapes(source, crs, context):
+        if shape is None:
             raise CrsError(
                 f"{name} can't be transformed to {crs.authid() or crs.description()}, in which kilometres are "
                 "measured: check that both coordinate systems are assigned as the data were made."
             )
         yield feature, shape
+
+
+def moved_shapes(
+    source: QgsProcessingFeatureSource, crs: QgsCoordinateReferenceSystem, context: QgsProcessingContext
+) -> Iterator[tuple[QgsFeature, QgsGeometry | None]]:
+    """Yield the features of a layer with their geometries in another coordinate system, None where it has no place."""
+    change = QgsCoordinateTransform(source.sourceCrs(), crs, context.transformContext())
+    for feature in source.getFeatures(QgsFeatureRequest(), GEOMETRY_AS_IT_IS):
+        shape = QgsGeometry(feature.geometry())
+        yield feature, shape if transform(shape, change) else None
 
 
 def _lines(
@@ -132,10 +140,6 @@ def _lines(
         for part in shape.constParts():
             vertices = [(one.x() * unit_m, one.y() * unit_m, one.m()) for one in part.vertices()]
             xym = np.array(vertices, dtype=float).reshape(-1, 3)
-            if not np.isfinite(xym[:, :2]).all():
-                raise RailExtractError(
-                    f"AXIS has a line (feature {feature.id()}) with a coordinate that is not a number: repair it."
-                )
             if len(xym) > 1 and (np.ptp(xym[:, :2], axis=0) > 0).any():
                 yield AxisLine(str(name), xym[:, :2], xym[:, 2])
 

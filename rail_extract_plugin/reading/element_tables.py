@@ -7,7 +7,7 @@ from typing import Any
 from qgis.core import NULL, QgsCoordinateReferenceSystem, QgsFeatureRequest, QgsProcessingFeatureSource
 
 from ...core.alignment.elements import Alignment
-from ...core.alignment.table import alignments, check_table, frame_of
+from ...core.alignment.table import alignments, check_table, frame_of, read_table
 from ...core.fields import ELEMENT_FIELDS
 from ...core.frame import LocalFrame
 from ...core.progress import SILENT, Progress
@@ -44,9 +44,9 @@ def read_elements(
     check_table(known, name)
     columns = [one.name for one in ELEMENT_FIELDS if one.name in known]
     features = progress.follow(source.getFeatures(QgsFeatureRequest(), GEOMETRY_AS_IT_IS), source.featureCount())
-    rows = [{column: _plain(feature[column]) for column in columns} for feature in features]
+    rows = read_table([{column: _plain(feature[column]) for column in columns} for feature in features], name)
     frame = frame_of(rows, system_of(crs, progress), name)
-    return alignments(rows, frame), frame
+    return alignments(rows, frame, progress), frame
 
 
 def _plain(value: Any) -> Any:

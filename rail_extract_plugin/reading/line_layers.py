@@ -29,6 +29,7 @@ from ...core.airborne.survey import Guide, gauge_of
 from ...core.clouds.crs import MAX_COORDINATE, parse_crs, units, warn_of_scale
 from ...core.clouds.mask import Mask
 from ...core.comparison.tracks import SurveyedLine
+from ...core.design_places import check_line, check_places, has_stray
 from ...core.errors import CrsError, MissingError, RailExtractError
 from ...core.fields import CENTERLINE_FIELDS, RAIL_FIELDS, Field
 from ...core.frame import ORIGIN_STEP, LocalFrame
@@ -38,13 +39,6 @@ from ...core.rails import NO_GAPS, SAME_SUM_M, Centerline, RailLine
 
 CHORD_TOLERANCE_M = 0.0005
 """Greatest deviation of the chords that approximate a curved line: well below the accuracy of a survey."""
-
-MAX_SEGMENT_M = 100_000.0
-"""A longer straight segment has a stray vertex: in the plane of a map, a railway that is straight on the ground bows by
-metres over this length."""
-
-MAX_SPIKE_M = 10_000.0
-"""A longer straight segment from which the line turns back has a stray vertex."""
 
 MAX_WHOLE, ID = 2**31 - 1, re.compile(r"\s*\d{1,10}\s*")
 """Largest whole number of a field in every format, and an id in a list of them."""
@@ -140,8 +134,7 @@ def read_guide(
     RailExtractError
         The layer has no line.
     """
-    shapes = _transformed(source, crs, context, "GUIDE")
-    lines = tuple(vertices[:, :2] for shape in shapes for vertices in _parts(shape, CHORD_TOLERANCE_M))
+    lines = tuple(line for _, line in _guides(source, crs, context, "GUIDE"))
     if not lines:
         raise MissingError("GUIDE", "line")
     return lines
@@ -157,17 +150,14 @@ def read_tracks_meant(
     source, crs, context
         See `read_guide`.
     """
-    shapes = _transformed(source, crs, context, "GUIDE")
-    features = source.getFeatures(QgsFeatureRequest(), GEOMETRY_AS_IT_IS)
     guides = tuple(
         Guide(
             feature.id(),
-            vertices[:, :2],
+            line,
             gauge_of(value_of(feature, "gauge")),
             *(str(value_of(feature, name) or "") for name in ("name", "ref")),
         )
-        for feature, shape in zip(features, shapes)
-        for vertices in _parts(shape, CHORD_TOLERANCE_M)
+        for feature, line in _guides(source, crs, context, "GUIDE")
     )
     if not guides:
         raise MissingError("GUIDE", "line")
@@ -191,12 +181,13 @@ def read_seeds(
     RailExtractError
         The layer has neither points nor lines.
     """
-    found: list[np.ndarray] = []
-    for shape in _transformed(source, crs, context, "SEEDS"):
-        if QgsWkbTypes.geometryType(shape.wkbType()) == QgsWkbTypes.GeometryType.PointGeometry:
-            found += [np.array([[vertex.x(), vertex.y()]]) for vertex in shape.vertices()]
-        elif QgsWkbTypes.geometryType(shape.wkbType()) == QgsWkbTypes.GeometryType.LineGeometry:
-            found += [vertices[:, :2] for vertices in _parts(shape, CHORD_TOLERANCE_M)]
+    points = [
+        np.array([[vertex.x(), vertex.y()]])
+        for _, shape in _transformed(source, crs, context, "SEEDS")
+        if QgsWkbTypes.geometryType(shape.wkbType()) == QgsWkbTypes.GeometryType.PointGeometry
+        for vertex in shape.vertices()
+    ]
+    found = [*points, *(line for _, line in _guides(source, crs, context, "SEEDS"))]
     if not found:
         raise RailExtractError("SEEDS has neither points nor lines: add points on railheads, or choose another layer.")
     return tuple(found)
@@ -246,7 +237,7 @@ def read_mask(
     RailExtractError
         The layer has no polygon.
     """
-    shapes = [shape.makeValid() for shape in _transformed(source, crs, context, "MASK") if not shape.isNull()]
+    shapes = [shape.makeValid() for _, shape in _transformed(source, crs, context, "MASK") if not shape.isNull()]
     united = QgsGeometry.unaryUnion(shapes)
     united.convertToStraightSegment(CHORD_TOLERANCE_M, QgsAbstractGeometry.SegmentationToleranceType.MaximumDifference)
     polygons = [part for part in united.constParts() if isinstance(part, QgsPolygon)] if shapes else []
@@ -262,16 +253,42 @@ def read_mask(
 
 def _transformed(
     source: QgsProcessingFeatureSource, crs: QgsCoordinateReferenceSystem, context: QgsProcessingContext, name: str
-) -> list[QgsGeometry]:
-    """Return the geometries of a layer in another coordinate system."""
+) -> list[tuple[QgsFeature, QgsGeometry]]:
+    """Return the features of a layer, all on the map, with their geometries in another coordinate system."""
     change = QgsCoordinateTransform(source.sourceCrs(), crs, context.transformContext())
-    shapes = [feature.geometry() for feature in source.getFeatures(QgsFeatureRequest(), GEOMETRY_AS_IT_IS)]
+    features = list(source.getFeatures(QgsFeatureRequest(), GEOMETRY_AS_IT_IS))
+    shapes, unit_m = [feature.geometry() for feature in features], _unit_m(source.sourceCrs())
+    for feature, shape in zip(features, shapes):
+        check_places(bounds_of(shape), f"{name} (feature {feature.id()})", unit_m)
     if not all(transform(shape, change) for shape in shapes):
         raise CrsError(
             f"{name} can't be transformed to the coordinate system of the cloud ({crs.authid() or crs.description()}): "
             "check that both are assigned as the data were made."
         )
-    return shapes
+    return list(zip(features, shapes))
+
+
+def _guides(
+    source: QgsProcessingFeatureSource, crs: QgsCoordinateReferenceSystem, context: QgsProcessingContext, name: str
+) -> Iterator[tuple[QgsFeature, np.ndarray]]:
+    """Yield the lines of a layer that show places along tracks, (k, 2), in another coordinate system."""
+    unit_m = _unit_m(crs if crs.isValid() else source.sourceCrs())
+    for feature, shape in _transformed(source, crs, context, name):
+        if QgsWkbTypes.geometryType(shape.wkbType()) == QgsWkbTypes.GeometryType.LineGeometry:
+            for vertices in _parts(shape, CHORD_TOLERANCE_M):
+                yield feature, check_line(vertices[:, :2], f"{name} (feature {feature.id()})", unit_m)
+
+
+def _unit_m(crs: QgsCoordinateReferenceSystem) -> float:
+    """Return the unit of a coordinate system in plan; that of degrees, or of an unknown one, counts as 1."""
+    return units(parse_crs(wkt_of(crs)))[0] if crs.isValid() and not crs.isGeographic() else 1.0
+
+
+def bounds_of(shape: QgsGeometry) -> np.ndarray:
+    """Return the smallest and the largest coordinates of a geometry, (2, 2); none, (0, 2), if it is empty."""
+    box = shape.boundingBox()
+    corners = np.array([[box.xMinimum(), box.yMinimum()], [box.xMaximum(), box.yMaximum()]])
+    return np.empty((0, 2)) if shape.isNull() or shape.isEmpty() else corners
 
 
 def transform(shape: QgsGeometry, change: QgsCoordinateTransform) -> bool:
@@ -302,7 +319,7 @@ def _read(
             f"{name} has a line (feature {lost}) with a coordinate that is not a number, or larger than "
             f"{MAX_COORDINATE:.0e}: repair or delete it."
         )
-    stray = next((feature.id() for feature, vertices in found if _is_stray(vertices[:, :2] * horizontal_unit_m)), None)
+    stray = next((feature.id() for feature, vertices in found if has_stray(vertices[:, :2] * horizontal_unit_m)), None)
     if stray is not None:
         raise RailExtractError(f"{name} has a line (feature {stray}) with a stray vertex: repair or delete it.")
     middle = np.median(np.concatenate([vertices for _, vertices in found]), axis=0)
@@ -318,15 +335,6 @@ def _is_impossible(vertices: np.ndarray) -> bool:
     return not (np.abs(vertices[:, :2]) <= MAX_COORDINATE).all() or bool(
         (np.abs(vertices[:, 2]) > MAX_COORDINATE).any()
     )
-
-
-def _is_stray(xy: np.ndarray) -> bool:
-    """Return whether a line, (n, 2) metres in plan, has a vertex that is a mistake: too far from the others."""
-    steps = np.diff(xy, axis=0)
-    lengths_m = np.hypot(*steps.T)
-    turns_back = np.einsum("ij,ij->i", steps[:-1], steps[1:]) < 0
-    spikes_m = np.maximum(lengths_m[:-1], lengths_m[1:])[turns_back]
-    return bool(lengths_m.max() > MAX_SEGMENT_M or spikes_m.max(initial=0.0) > MAX_SPIKE_M)
 
 
 def system_of(crs: QgsCoordinateReferenceSystem, progress: Progress) -> tuple[str | None, float, float]:

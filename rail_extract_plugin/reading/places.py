@@ -16,13 +16,15 @@ from qgis.core import (
 )
 
 from ...core.alignment.placed_axes import PlacedAxes
+from ...core.design_places import are_places
 from ...core.fields import EXTENT_FIELDS, STATION_FIELDS, Field
 from ...core.progress import Progress
 from ...core.rails import Kilometres
-from .axes import shapes_in
+from .axes import moved_shapes
+from .line_layers import bounds_of
 
-NOWHERE = np.full(2, np.nan)
-"""Place of a feature without geometry."""
+NOWHERE, FAR = np.full(2, np.nan), np.full(2, np.inf)
+"""Place of a feature without geometry, and of one that is not on the map."""
 
 
 @dataclass(frozen=True)
@@ -78,23 +80,22 @@ def locate_features(
         Of the axes.
     context : QgsProcessingContext
     progress : Progress
-
-    Raises
-    ------
-    CrsError
-        A feature can't be transformed to the plane of the axes.
     """
-    found = list(progress.span(0, 0.3).follow(shapes_in(source, crs, context, "INPUT"), source.featureCount()))
-    places = np.array([_place(shape) for _, shape in found]).reshape(-1, 2)
-    known = np.isfinite(places).all(axis=1)
+    moved = moved_shapes(source, crs, context)
+    found = list(progress.span(0, 0.3).follow(moved, source.featureCount()))
+    places = np.array([_place(shape, axes.unit_m) for _, shape in found]).reshape(-1, 2)
+    known = axes.on_map(places, [feature.id() for feature, _ in found], progress)
     kilometres = Kilometres.empty(len(found))
     kilometres.put(known, axes.locate(places[known], progress.span(0.3, 0.7)))
-    extents_km = _extents([shape for _, shape in found], axes, progress.span(0.7, 1.0))
+    shapes = [shape if on_map else None for (_, shape), on_map in zip(found, known)]
+    extents_km = _extents(shapes, axes, progress.span(0.7, 1.0))
     return LocatedFeatures([feature for feature, _ in found], kilometres, extents_km)
 
 
-def _place(shape: QgsGeometry) -> np.ndarray:
+def _place(shape: QgsGeometry | None, unit_m: float) -> np.ndarray:
     """Return where a feature counts, (2,): half way along a line, inside a polygon, in the mean of points."""
+    if shape is None or not are_places(bounds_of(shape), unit_m).all():
+        return FAR
     if shape.isNull() or shape.isEmpty():
         return NOWHERE
     kind = QgsWkbTypes.geometryType(shape.wkbType())
@@ -109,11 +110,11 @@ def _place(shape: QgsGeometry) -> np.ndarray:
     return np.array([point.constGet().x(), point.constGet().y()])
 
 
-def _extents(shapes: list[QgsGeometry], axes: PlacedAxes, progress: Progress) -> np.ndarray:
+def _extents(shapes: list[QgsGeometry | None], axes: PlacedAxes, progress: Progress) -> np.ndarray:
     """Return the smallest and the largest kilometre of the vertices of shapes other than points, (n, 2)."""
     numbers, vertices = [], []
     for number, shape in enumerate(shapes):
-        if QgsWkbTypes.geometryType(shape.wkbType()) != QgsWkbTypes.GeometryType.PointGeometry:
+        if shape is not None and QgsWkbTypes.geometryType(shape.wkbType()) != QgsWkbTypes.GeometryType.PointGeometry:
             own = [(vertex.x(), vertex.y()) for vertex in shape.vertices()]
             vertices += own
             numbers += [number] * len(own)

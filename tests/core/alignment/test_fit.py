@@ -243,6 +243,7 @@ def test_arcs_near_the_noise_are_said():
 
 def test_an_arc_may_turn_round():
     spiral = design([(80.0, 0, 0), (60.0, 0, 1 / 150), (800.0, 1 / 150, 1 / 150), (60.0, 1 / 150, 0), (80.0, 0, 0)])
+    spiral = replace(spiral, vertical=(VerticalElement(0, 1080, 50, 0.01, 0.01),))
     found = fit(track(spiral)).alignment
     assert [one.type for one in found.plan] == ["line", "clothoid", "arc", "clothoid", "line"]
     assert found.plan[2].k_from == pytest.approx(1 / 150, rel=1e-4)

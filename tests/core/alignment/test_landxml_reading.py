@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 from rail_extract.core.alignment.landxml_reading import read_landxml
-from rail_extract.core.errors import AlignmentFileError
+from rail_extract.core.errors import AlignmentFileError, RailExtractError
 from rail_extract.core.progress import Progress, Recording
 
 METRIC = '<Units><Metric linearUnit="meter"/></Units>'
@@ -131,7 +131,31 @@ REFUSED = {
     "not a list of numbers": landxml("<Line><Start>1 2</Start><End>1,5 2,5</End></Line>"),
     "states 'wide' as its radius": landxml(LINE + CURVE.replace('"300"', '"wide"')),
     "states a radius of 301": landxml(LINE + CURVE.replace('"300"', '"301"')),
-    "has a radiusStart of 0": landxml(LINE + SPIRAL.replace("INF", "0")),
+    "has the radiusStart 0, but": landxml(LINE + SPIRAL.replace("INF", "0")),
+    "coincides with its centre": landxml(
+        '<Curve rot="cw"><Start>1 1</Start><Center>1 1</Center><End>1 1</End></Curve>'
+    ),
+    "has the turn 159154.9[0-9]*, but an element turns by up to 100": landxml(
+        '<Curve rot="cw" radius="0.001" length="1000"><Start>1 1</Start><Center>1 1.001</Center><End>1 1</End></Curve>'
+    ),
+    "has the length -139, but lengths are above 0": landxml(
+        LINE + SPIRAL + CURVE.replace("<Curve", "<Curve length='-139'")
+    ),
+    "has the length 0, but lengths": landxml(LINE + SPIRAL + CURVE.replace("<Curve", "<Curve length='0'")),
+    "has the length inf, but": landxml(LINE + SPIRAL.replace('length="60"', 'length="INF"')),
+    "has the coordinate 1e.200, but": landxml(LINE + "<Line><Start>1 1</Start><End>1 1e200</End></Line>"),
+    "has the staStart inf, but": landxml().replace('staStart="100"', "staStart='INF'"),
+    "has the staAhead inf, but": landxml(further="<StaEquation staInternal='150' staAhead='INF'/>"),
+    "has the appliedCant inf, but cants are up to 1000 mm": landxml(
+        further="<Cant gauge='1'><CantStation station='100' appliedCant='0' curvature='cw'/>"
+        "<CantStation station='150' appliedCant='inf' curvature='cw'/></Cant>"
+    ),
+    "has the gradient 5, but": landxml(
+        further="<Profile><ProfAlign><PVI>100 1</PVI><PVI>200 501</PVI></ProfAlign></Profile>"
+    ),
+    "has the length 9999[0-9]*, but": landxml(
+        further="<Profile><ProfAlign><PVI>100 1</PVI><PVI>1e9 1</PVI></ProfAlign></Profile>"
+    ),
     "does not state its length": landxml(LINE + SPIRAL.replace('length="60"', "")),
     "has no element": landxml(""),
     "goes back": landxml(further="<Profile><ProfAlign><PVI>100 1</PVI><PVI>90 1</PVI></ProfAlign></Profile>"),
@@ -152,9 +176,25 @@ REFUSED = {
 
 @pytest.mark.parametrize(("sentence", "text"), REFUSED.items())
 def test_faults_are_refused_in_a_sentence(read, sentence, text):
-    with pytest.raises(AlignmentFileError, match=sentence) as caught:
+    with pytest.raises(RailExtractError, match=sentence) as caught:
         read(text)
     assert str(caught.value).endswith((".", "LandXML."))
+
+
+def test_a_profile_elsewhere_is_left_out_with_a_warning(read):
+    heard = Recording(Progress())
+    profile = "<Profile><ProfAlign><PVI>9100 1</PVI><PVI>9200 1</PVI></ProfAlign></Profile>"
+    (found,) = read(landxml(further=profile), progress=heard)
+    assert found.vertical == ()
+    assert any("from 9100.00 m to 9200.00 m, and the plan from 100.00 m" in one for one in heard.warnings)
+
+
+def test_long_texts_and_attributes_count(read, monkeypatch):
+    comments = "<Feature>" + "word <!-- --> " * 20_000 + "</Feature>"
+    assert len(read(landxml(comments + LINE))[0].plan) == 1
+    monkeypatch.setattr("rail_extract.core.alignment.xml_branches.MAX_CHARACTERS", 10_000)
+    with pytest.raises(AlignmentFileError, match="any railway"):
+        read(landxml(f"<Feature name='{'word' * 5_000}'/>" + LINE))
 
 
 def test_what_is_beside_the_alignments_does_not_fill_the_memory(read, monkeypatch):
