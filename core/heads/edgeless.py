@@ -121,7 +121,7 @@ class Ridge:
 
     @classmethod
     def find(cls, points: HeadPoints) -> Ridge | None:
-        """Fit one parabola, and a crest for each window, to the points of a line; None if it has none or is not blunt."""
+        """Fit one parabola, and a crest for each window, to the points of a line; None without any, or if not blunt."""
         near = points[points.within(REACH_HEADS)]
         if not points.is_blunt or not len(near.t):
             return None
