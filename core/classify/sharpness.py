@@ -46,9 +46,7 @@ def is_decided(seen: SearchFigures) -> bool:
     return seen.sharp_m >= SHARP_M or seen.round_m >= BLUNT_M
 
 
-def search_alike(
-    parts: Sequence[Part], search: Callable[[Sequence[Part], bool], Iterable[Answer]]
-) -> Iterator[Answer]:
+def search_alike(parts: Sequence[Part], search: Callable[[Sequence[Part], bool], Iterable[Answer]]) -> Iterator[Answer]:
     """Search all parts of a cloud in the way that suits it.
 
     Parameters
