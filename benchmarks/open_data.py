@@ -299,7 +299,7 @@ def measure(
         found = classify_cloud(xyz, Settings((standard.gauge_m,), standard.head_width_m, weights=weights)).rail
     classified = time.process_time()
     frame = LocalFrame(np.floor(xyz.min(axis=0)))
-    rails, tracks_m, gauge_mm = draw(xyz[found], frame, standard)
+    rails, tracks_m, gauge_mm = draw(xyz[found], frame, standard, not labelled)
     drawn = time.process_time()
     heads = np.flatnonzero(rail)[on_heads(frame.to_local(xyz[rail]))]
     cells, cells_right, pieces_m, across_m, height_m = compare(rails, xyz[heads])
@@ -325,12 +325,14 @@ def measure(
     return result, Visit(place.run, rails)
 
 
-def draw(xyz: np.ndarray, frame: LocalFrame, standard: RailStandard) -> tuple[tuple[RailLine, ...], float, np.ndarray]:
+def draw(
+    xyz: np.ndarray, frame: LocalFrame, standard: RailStandard, found: bool
+) -> tuple[tuple[RailLine, ...], float, np.ndarray]:
     """Draw rails in the coordinates of the files, with the length of the tracks and their gauge at each metre."""
     if not len(xyz):
         return (), 0.0, np.empty(0)
     parameters = Parameters(standard.gauge_m, standard.head_width_m, quality_step_m=1.0)
-    network = extract_rails([RailPoints(frame.to_local(xyz), frame, RAIL_CLASS)], parameters)
+    network = extract_rails([RailPoints(frame.to_local(xyz), frame, RAIL_CLASS, found=found)], parameters)
     rails = tuple(replace(one, xyz=network.frame.to_crs(one.xyz)) for one in network.rails)
     gauges = [track.gauge_mm[~track.bridged & np.isfinite(track.gauge_mm)] for track in network.geometry]
     return rails, sum(one.length_m for one in network.centerlines), np.concatenate([np.empty(0), *gauges])

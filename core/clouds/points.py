@@ -48,12 +48,15 @@ class RailPoints:
     class_code : int
     strips : (n,) array or None
         Number of the strip, a pass of the scanner, that each point belongs to; None if all points are of one strip.
+    found : bool
+        Whether they were found in a raw cloud, on heads; a class of a file may hold whole rails.
     """
 
     xyz: np.ndarray
     frame: LocalFrame
     class_code: int
     strips: np.ndarray | None = None
+    found: bool = False
 
     def kept(self, which: np.ndarray) -> RailPoints:
         """Return some of the points, by a mask (n,) bool or by their numbers (k,)."""

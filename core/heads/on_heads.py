@@ -155,8 +155,10 @@ def _highest(group: np.ndarray, z: np.ndarray, window_m: float, share: float) ->
 def heads_of(points: RailPoints) -> RailPoints:
     """Return the points of rails without those on webs and feet, and on what lies below.
 
-    Nothing is left out of a class that holds heads alone.
+    Nothing is left out of a class that holds heads alone, and points that were found in a raw cloud are on heads.
     """
+    if points.found:
+        return points
     kept = on_heads(points.xyz)
     return points if kept.all() else points.kept(kept)
 

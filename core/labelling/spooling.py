@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -102,4 +103,4 @@ def spool_grown(
 def _gathered(request: Request, side_m: float, folder: Path, census: Census) -> SpooledPoints:
     """Return the points that were sorted."""
     (source,) = gather(request, side_m, [SpooledFile(str(folder), census.report())])
-    return source
+    return replace(source, found=True)

@@ -62,6 +62,8 @@ class SpooledPoints:
         Files that hold the points of each square, one for each mark (see `passes.marks_of`), with which its name ends.
     passes : mapping of int to int
         Number of the strip, a pass of the scanner, of each mark.
+    found : bool
+        See `RailPoints`.
     """
 
     frame: LocalFrame
@@ -71,6 +73,7 @@ class SpooledPoints:
     span_m: float
     files: Mapping[Key, tuple[str, ...]]
     passes: Mapping[int, int]
+    found: bool = False
 
     def near(self, square: Square, margin_m: float) -> RailPoints:
         """See `PointSource`."""
@@ -80,7 +83,7 @@ class SpooledPoints:
         xyz = parts[0] if len(parts) == 1 else np.concatenate(parts or [np.empty((0, 3))])
         strips = np.array([self.passes[_numbers(file)[-1]] for file in files], dtype=np.int32)
         each = np.repeat(strips, [len(part) for part in parts]) if len(np.unique(strips)) > 1 else None
-        return heads_of(RailPoints(xyz, square.frame, self.class_code, each))
+        return heads_of(RailPoints(xyz, square.frame, self.class_code, each, self.found))
 
     def part(self, square: Square) -> SpooledPoints:
         """Keep only a square and its neighbours, so that less is sent to a worker."""

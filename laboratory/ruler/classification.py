@@ -121,7 +121,7 @@ def draw(scene: RawScene, rail: np.ndarray, model: str = Parameters.model) -> Ra
     """Extract rails from labelled points, (n,) bool; None without any."""
     if not rail.any():
         return None
-    points = RailPoints(scene.xyz[rail], scene.frame, RAIL)
+    points = RailPoints(scene.xyz[rail], scene.frame, RAIL, found=True)
     gauge_m, head_width_m = scene.standard.gauge_m, scene.standard.head_width_m
     parameters = Parameters(gauge_m, head_width_m, other_gauges_m=scene.other_gauges_m, model=model, quality_step_m=1.0)
     return extract_rails([points], parameters)

@@ -154,6 +154,14 @@ def narrow(seed: int) -> RawScene:
     return scan_world("narrow", parallel(curve, (0.0,), 0.06, standard), standard, [TRAIN], things, seed)
 
 
+def thin_ballast(seed: int) -> RawScene:
+    """Metre gauge in a curve of 90 m, on sleepers that stand 7 cm out of the ballast."""
+    standard = STANDARDS["EN_49E1_1000"]
+    tracks = parallel(line(60.0, -1 / 90, 0.2), (0.0,), 0.06, standard)
+    things: list[Thing] = [ground, running_rails, thing(plants, 60, (-6.0, -3.0))]
+    return scan_world("thin ballast", tracks, standard, [TRAIN], things, seed, Bedding(fill_m=0.07))
+
+
 def metro(seed: int) -> RawScene:
     """Tunnel with slab track, a third rail and a guard rail along a curve of 150 m."""
     curve = line(50.0, 1 / 150, 0.9)
@@ -293,6 +301,7 @@ MOBILE: dict[str, Callable[[int], RawScene]] = {
     "turnout 1:18.5": partial(turnout, form="1200-1:18.5"),
     "yard": yard,
     "narrow": narrow,
+    "thin ballast": thin_ballast,
     "metro": metro,
     "viaduct": bridge,
     "far track": far_track,

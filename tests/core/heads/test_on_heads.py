@@ -1,10 +1,14 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from rail_extract.core.heads.on_heads import on_heads
+from rail_extract.core.clouds.points import RailPoints
+from rail_extract.core.frame import LocalFrame
+from rail_extract.core.heads.on_heads import heads_of, on_heads
 
 HEAD, WEB, FOOT, SLEEPER = range(4)
 
@@ -68,6 +72,13 @@ def test_a_rail_without_a_head_is_kept():
     """Where the class holds no head, nothing says that the points are below one."""
     xyz, part = rail(30.0)
     assert on_heads(xyz[part == FOOT]).all()
+
+
+def test_points_that_were_found_in_a_raw_cloud_are_kept():
+    xyz, part = rail(30.0)
+    points = RailPoints(xyz, LocalFrame(np.zeros(3)), 10)
+    assert len(heads_of(points).xyz) < 1.01 * (part == HEAD).sum()
+    assert heads_of(replace(points, found=True)).xyz is xyz
 
 
 @pytest.mark.parametrize("count", [0, 1, 2, 5])
