@@ -61,7 +61,8 @@ def search_alike(parts: Sequence[Part], search: Callable[[Sequence[Part], bool],
     Answer
         For each part.
     """
-    seen, done, found = SearchFigures(), 0, []
+    seen, done = SearchFigures(), 0
+    found: list[Answer] = []
     while done < len(parts) and not is_decided(seen):
         batch = parts[done : done + max(done, FIRST_PARTS)]
         answers = list(search(batch, False))

@@ -196,7 +196,7 @@ class OnHeads:
     def _decide_around(self, key: Key) -> None:
         """Find out whether the cloud is sharp or blunt, by the rails in a square and in those next to it."""
         seen = SearchFigures()
-        for step in sorted(product((-1, 0, 1), repeat=2), key=lambda step: np.hypot(*step)):
+        for step in sorted(product((-1, 0, 1), repeat=2), key=lambda step: step[0] ** 2 + step[1] ** 2):
             if not is_decided(seen):
                 seen += self._classified((key[0] + step[0], key[1] + step[1])).figures
         self._is_decided = seen.sharp_m + seen.round_m > 0
