@@ -5,9 +5,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field, fields
 from importlib import import_module
+from inspect import Parameter, Signature
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import ModuleType
@@ -16,8 +17,12 @@ from typing import TYPE_CHECKING, Any
 from .classify.settings import Settings
 from .clouds.points import ask
 from .clouds.readers import Extent, Paths, paths_of
+from .commands.files import run_with_files
 from .disk import Destination
 from .errors import ParameterError
+from .jobs import CALLS
+from .jobs.declaration import Job
+from .jobs.result import Result
 from .labelling.files import Choice, classify_files, plan_output
 from .parameters import DEFAULT_STEP_M, Parameters
 from .pipeline import extract_files
@@ -230,6 +235,40 @@ def classify(
     settings = Settings((profile.gauge_m,), profile.head_width_m)
     with scratch_folder(planned.file.parent) as folder, workers_of(workers) as runner:
         return classify_files(request, settings, Choice(rail_class), planned, folder, runner, progress).figures
+
+
+def __getattr__(name: str) -> Callable[..., Result]:
+    """Return a job as a function."""
+    if name not in CALLS:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return function_of(CALLS[name])
+
+
+def function_of(job: Job) -> Callable[..., Result]:
+    """Return a job as a function whose arguments have the names of its parameters and outputs, in small letters.
+
+    What must be given comes first; files of outputs may be left out, because the result writes them as well.
+    """
+    stated = sorted((*job.parameters, *job.outputs), key=lambda one: not one.is_input)
+
+    def call(*args: Any, **given: Any) -> Result:
+        values = signature.bind(*args, **given).arguments
+        progress = values.pop("progress", SILENT)
+        plain = {name: str(value) if isinstance(value, Path) else value for name, value in values.items()}
+        command = f"rail_extract.{job.call}({', '.join(f'{name}={value!r}' for name, value in plain.items())})"
+        named = {name.upper(): value for name, value in values.items()}
+        return run_with_files(job, named, command, progress, lambda one: one.name.lower())
+
+    first, later = Parameter.POSITIONAL_OR_KEYWORD, Parameter.KEYWORD_ONLY
+    arguments = [
+        Parameter(one.name.lower(), first) if one.is_input else Parameter(one.name.lower(), later, default=one.default)
+        for one in stated
+    ]
+    signature = Signature([*arguments, Parameter("progress", later, default=SILENT)], return_annotation=Result)
+    texts = [f"{one.name.lower()}\n    {one.label}. {one.help}" for one in stated]
+    call.__name__, call.__signature__ = job.call, signature  # type: ignore[attr-defined]
+    call.__doc__ = "\n".join([job.summary, "", job.help, "", "Parameters", "----------", *texts])
+    return call
 
 
 def _package(name: str) -> ModuleType:

@@ -6,7 +6,7 @@ import argparse
 import math
 import signal
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import replace
 from importlib import import_module
@@ -289,10 +289,15 @@ class Console(Progress):
 
     Python drops the exception of a Ctrl-C that comes during a finalizer or some callbacks. The run then ends at its
     next check for cancellation.
+
+    Parameters
+    ----------
+    word : callable
+        Returns a message with the names of options for those of parameters.
     """
 
-    def __init__(self) -> None:
-        self._interrupted = False
+    def __init__(self, word: Callable[[str], str] = str) -> None:
+        self._interrupted, self._word = False, word
         signal.signal(signal.SIGINT, self._interrupt)
 
     def _interrupt(self, *_: object) -> None:
@@ -309,8 +314,8 @@ class Console(Progress):
 
     def info(self, text: str) -> None:
         """Print what was done."""
-        print(text, file=sys.stderr, flush=True)
+        print(self._word(text), file=sys.stderr, flush=True)
 
     def warning(self, text: str) -> None:
         """Print a warning."""
-        print(f"Warning: {text}", file=sys.stderr, flush=True)
+        print(f"Warning: {self._word(text)}", file=sys.stderr, flush=True)

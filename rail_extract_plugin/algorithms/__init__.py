@@ -1,22 +1,29 @@
 """The algorithms of the toolbox, one module each."""
 
+from __future__ import annotations
+
+from ...core.jobs import compare_tracks, export_alignment, fit_alignment, import_alignment
+from ...core.jobs.declaration import Job
 from .airborne_centerlines import AirborneCenterlines
+from .base import JobAlgorithm, RailAlgorithm
 from .build_track_centerlines import BuildTrackCenterlines
 from .check_installation import CheckInstallation
 from .classify_rail_points import ClassifyRailPoints
-from .compare_tracks import CompareTracks
-from .export_alignment import ExportAlignment
 from .extract_rails import ExtractRails
-from .fit_alignment import FitAlignment
 from .frpdf_cleanup import FrpdfCleanup
 from .grow_rail_points import GrowRailPoints
-from .import_alignment import ImportAlignment
 from .install_packages import InstallPackages
 from .measure_track_geometry import MeasureTrackGeometry
 from .rasterize_rail_points import RasterizeRailPoints
 from .station_along_axis import StationAlongAxis
 from .train_rail_classifier import TrainRailClassifier
 from .vectorize_rails import VectorizeRails
+
+
+def _of(job: Job) -> type[RailAlgorithm]:
+    """Return the algorithm of a job."""
+    return type(job.name, (JobAlgorithm,), {"JOB": job, "__doc__": job.summary})
+
 
 ALGORITHMS = (
     ExtractRails,
@@ -29,10 +36,10 @@ ALGORITHMS = (
     BuildTrackCenterlines,
     MeasureTrackGeometry,
     StationAlongAxis,
-    FitAlignment,
-    CompareTracks,
-    ExportAlignment,
-    ImportAlignment,
+    _of(fit_alignment.JOB),
+    _of(compare_tracks.JOB),
+    _of(export_alignment.JOB),
+    _of(import_alignment.JOB),
     TrainRailClassifier,
     InstallPackages,
     CheckInstallation,

@@ -7,20 +7,18 @@ from typing import TYPE_CHECKING, Any
 
 from ...core.errors import ParameterError
 from ...core.fields import AIRBORNE, PROPOSED
+from ...core.jobs.airborne_centerlines import JOB
+from ...core.jobs.values import class_numbers
 from ...core.parameters import AirborneParameters
 from ...core.progress import Estimating, Progress
 from ...core.standards import SEARCHED_CLASSES, RailStandard
-from ..dialog import inputs, outputs
-from ..dialog import parameters as groups
-from ..dialog.definitions import Definitions
-from ..dialog.parameter_values import ParameterValues, class_numbers
+from ..dialog.parameter_values import ParameterValues
 from ..reading.clouds import CloudSource, points_folder, request_points
 from ..writing.layers import figures_of, layer_writers, write_layer
 from ..writing.reports import write_shown
 from ..writing.run import properties_of
 from ..writing.whole_files import write_each
-from .base import CLOUD_WORDS, RAIL_WORDS, TRACK_WORDS, RailAlgorithm
-from .toolbox_groups import RAW_CLOUDS
+from .base import RailAlgorithm
 
 if TYPE_CHECKING:
     from ...core.airborne.proposals import Proposals
@@ -42,46 +40,13 @@ class Job:
 class AirborneCenterlines(RailAlgorithm):
     """The algorithm ``railextract:airbornecenterlines``."""
 
-    NAME = "airbornecenterlines"
-    LABEL = "Track centerlines from airborne lidar"
-    GROUP = RAW_CLOUDS
-    TAGS = (*RAIL_WORDS, *CLOUD_WORDS, *TRACK_WORDS, "airborne", "ALS", "national", "OpenStreetMap", "centerline")
-    NEEDS = (("numpy",), ("scipy",), ("laspy",), ("lazrs",), ("pyproj",))
-    SUMMARY = "Fits the centerlines of tracks in airborne lidar, along lines that say which tracks are meant."
-    PICTURE = "gauge.svg"
-    GUIDE = "airborne"
-    PAGES = ("airborne", "parameters")
-    HELP = (
-        "For the clouds of national surveys, with 5 to 100 points per square metre, which show no single railheads; "
-        "for mobile lidar, use Extract Rails.\n\n"
-        "A line ends where the track is not seen for more than 30 m; the stations state why. The standard error "
-        "leaves out that of the flight against its datum, often 3 to 10 cm.\n\n"
-        "Without a guide, the whole cloud is searched, in minutes per square kilometre. Correct the guides that are "
-        "proposed, and run again with them."
-    )
-
-    def definitions(self) -> Definitions:
-        """Return the parameters and outputs in the order of the interface."""
-        return (
-            *inputs.airborne_cloud(),
-            inputs.tracks_meant(),
-            *groups.rail(),
-            *groups.airborne(),
-            *groups.area(),
-            groups.workers(),
-            outputs.airborne_centerlines(),
-            outputs.further(outputs.airborne_stations()),
-            outputs.further(outputs.findings()),
-            outputs.further(outputs.proposed_guides()),
-            outputs.report(),
-            *outputs.airborne_figures(),
-        )
+    JOB = JOB
 
     def read(self, values: ParameterValues) -> Job:
         """Read and check the parameters, in the main thread."""
         standard, cloud, classes = values.standard(), values.cloud("INPUT"), values.text("CLASSES").strip()
         codes = class_numbers(classes, "CLASSES") if classes else SEARCHED_CLASSES
-        command = values.command()
+        command = values.command
         guides = values.tracks_meant(cloud)
         if not guides and not values.wanted("PROPOSED"):
             raise ParameterError("GUIDE is empty: choose lines along the tracks, or PROPOSED to have some proposed.")

@@ -6,15 +6,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ...core.jobs.classify_rail_points import JOB
 from ...core.progress import Estimating, Progress
 from ...core.standards import SEARCHED_CLASSES, Gauge, RailStandard
-from ..dialog import inputs, outputs
-from ..dialog import parameters as groups
-from ..dialog.definitions import Definitions
 from ..dialog.parameter_values import ParameterValues
 from ..reading.clouds import CloudSource, points_folder, request_points
-from .base import CLOUD_WORDS, RAIL_WORDS, RailAlgorithm
-from .toolbox_groups import RAW_CLOUDS
+from .base import RailAlgorithm
 
 if TYPE_CHECKING:
     import numpy as np
@@ -38,39 +35,7 @@ class Job:
 class ClassifyRailPoints(RailAlgorithm):
     """The algorithm ``railextract:classifyrailpoints``."""
 
-    NAME = "classifyrailpoints"
-    LABEL = "Classify rail points"
-    GROUP = RAW_CLOUDS
-    TAGS = (*RAIL_WORDS, *CLOUD_WORDS, "classification", "raw", "segmentation", "Klassifizierung")
-    PICTURE = "gauge.svg"
-    NEEDS = (("numpy",), ("scipy",), ("laspy",), ("lazrs",), ("pyproj",))
-    SUMMARY = "Finds the points on railheads in a lidar cloud that nobody has classified, and writes a classified copy."
-    HELP = (
-        "Rails are found by their shape: no classes of the ground, no trajectory and no training are needed. A "
-        "classifier that you have trained can be used instead. Noise and withheld points are left "
-        "out of the search.\n\n"
-        "The copy has the same points in the same order with the same attributes; only classes differ. Where the "
-        "input is a folder or a virtual point cloud, a folder of the same tiles is written, with a virtual point "
-        "cloud (.vpc) of the same name next to it.\n\n"
-        "The log states how many metres of rail were found with and without a partner. Below 10 cells with points "
-        "per metre of rail, lines are less accurate and may have gaps. The method was tested on simulated clouds only."
-    )
-
-    def definitions(self) -> Definitions:
-        """Return the parameters and outputs in the order of the interface."""
-        return (
-            inputs.raw_cloud(),
-            *groups.rail(),
-            groups.other_gauges(),
-            *groups.area(),
-            inputs.guide(),
-            *groups.guide(),
-            *groups.method(),
-            *groups.labels(),
-            groups.workers(),
-            outputs.classified(),
-            *outputs.classified_figures(),
-        )
+    JOB = JOB
 
     def read(self, values: ParameterValues) -> Job:
         """Read and check the parameters, in the main thread."""

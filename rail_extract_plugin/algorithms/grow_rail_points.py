@@ -6,18 +6,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ...core.jobs.grow_rail_points import JOB
 from ...core.parameters import GrowParameters
 from ...core.progress import Estimating, Progress
 from ...core.standards import SEARCHED_CLASSES, RailStandard
-from ..dialog import inputs, outputs
-from ..dialog import parameters as groups
-from ..dialog.definitions import Definitions
 from ..dialog.parameter_values import ParameterValues
 from ..reading.clouds import CloudSource, points_folder, request_points
 from ..writing.layers import write_layer
-from .base import CLOUD_WORDS, RAIL_WORDS, RailAlgorithm
-from .classify_rail_points import ClassifyRailPoints, classified_results
-from .toolbox_groups import RAW_CLOUDS
+from .base import RailAlgorithm
+from .classify_rail_points import classified_results
 
 if TYPE_CHECKING:
     import numpy as np
@@ -38,37 +35,7 @@ class Job:
 class GrowRailPoints(RailAlgorithm):
     """The algorithm ``railextract:growrailpoints``."""
 
-    NAME = "growrailpoints"
-    LABEL = "Grow rail points from seeds"
-    GROUP = RAW_CLOUDS
-    TAGS = (*RAIL_WORDS, *CLOUD_WORDS, "classification", "raw", "seed", "interactive", "follow", "Klassifizierung")
-    PICTURE = "gauge.svg"
-    NEEDS = ClassifyRailPoints.NEEDS
-    SUMMARY = "Follows rails in a lidar cloud from places that you point at, and classifies their points in a copy."
-    HELP = (
-        "Each rail is followed to both sides along its head, over crossings and through switches, up to the longest "
-        "run. The log states where each rail stops, and why.\n\n"
-        "The copy has the same points in the same order with the same attributes; points on these rails get the class "
-        "of rail points. Where the input is a folder or a virtual point cloud, a folder of the same tiles is written, "
-        "with a virtual point cloud (.vpc) next to it.\n\n"
-        "The toolbar button Grow Rails lets you click rails on the map and shows at once what grows. The method was "
-        "tested on simulated clouds only."
-    )
-
-    def definitions(self) -> Definitions:
-        """Return the parameters and outputs in the order of the interface."""
-        return (
-            inputs.raw_cloud(),
-            *inputs.seeds(),
-            *groups.rail(),
-            *groups.growth(),
-            groups.crs(),
-            groups.leave_out(),
-            *groups.content(),
-            outputs.classified(),
-            outputs.further(outputs.stops()),
-            *outputs.classified_figures(),
-        )
+    JOB = JOB
 
     def read(self, values: ParameterValues) -> Job:
         """Read and check the parameters, in the main thread."""

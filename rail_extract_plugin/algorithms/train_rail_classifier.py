@@ -7,16 +7,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...core.disk import Destination
+from ...core.jobs.train_rail_classifier import JOB
 from ...core.progress import Estimating, Progress
 from ...core.standards import SEARCHED_CLASSES, RailStandard
-from ..dialog import inputs, outputs
-from ..dialog import parameters as groups
-from ..dialog.definitions import Definitions
 from ..dialog.parameter_values import ParameterValues
 from ..reading.clouds import CloudSource, request_points
 from ..writing.reports import write_page
-from .base import CLOUD_WORDS, RAIL_WORDS, RailAlgorithm
-from .toolbox_groups import RAW_CLOUDS
+from .base import RailAlgorithm
 
 if TYPE_CHECKING:
     from ...core.labelling.training import Plan
@@ -34,36 +31,7 @@ class Job:
 class TrainRailClassifier(RailAlgorithm):
     """The algorithm ``railextract:trainrailclassifier``."""
 
-    NAME = "trainrailclassifier"
-    LABEL = "Train rail classifier"
-    GROUP = RAW_CLOUDS
-    TAGS = (*RAIL_WORDS, *CLOUD_WORDS, "classification", "training", "RandLA-Net", "deep learning", "neural network")
-    PICTURE = "gauge.svg"
-    NEEDS = (("numpy",), ("scipy",), ("laspy",), ("lazrs",), ("pyproj",), ("torch",))
-    SUMMARY = "Trains a network on clouds whose rail points have a class, so that it classifies other clouds."
-    HELP = (
-        "Choose clouds with labelled rail points, the classes of these points and a file for the weights, then run. "
-        "All other points are examples of what is not on rails: the clouds must contain them. A training takes minutes "
-        "on a GPU and hours on a CPU.\n\n"
-        "Classify rail points and Extract rails use the weights if a trained classifier finds rail points there. "
-        "A classifier knows the scanner that it learned from; for other scanners, geometry is often better. A fifth "
-        "of the places is kept back, and "
-        "the card states how well the classifier labels them.\n\n"
-        "A cancelled run keeps what it has learned in a folder next to the weights. The same run continues "
-        "it."
-    )
-
-    def definitions(self) -> Definitions:
-        """Return the parameters and outputs in the order of the interface."""
-        return (
-            *inputs.cloud(),
-            *groups.rail(),
-            *groups.area(),
-            *groups.training(),
-            outputs.weights(),
-            outputs.card(),
-            *outputs.training_figures(),
-        )
+    JOB = JOB
 
     def read(self, values: ParameterValues) -> Job:
         """Read and check the parameters, in the main thread."""

@@ -39,7 +39,6 @@ if TYPE_CHECKING:
     import numpy as np
 
     from ...core.airborne.survey import AirborneLine
-    from ...core.alignment.fit import Fit
     from ...core.frame import LocalFrame
     from ...core.output.layers import Layer
     from ...core.output.raster_file import RasterHeader
@@ -216,14 +215,6 @@ def figures_of_stations(tracks: Sequence[TrackGeometry]) -> dict[str, Any]:
         "SIGMA": SIGMA.value(math.sqrt(sum(value**2 for value in sigma) / len(sigma))) if sigma else None,
         "BRIDGED_LENGTH": BRIDGED.value(sum(track.bridged_m for track in tracks)),
     }
-
-
-def figures_of_fits(fits: Sequence[Fit]) -> dict[str, Any]:
-    """Return the number of elements, and the root mean square of the slews in millimetres, as outputs."""
-    squares = sum(float((fit.deviations.slew_mm**2).sum()) for fit in fits)
-    count = sum(len(fit.deviations.s) for fit in fits)
-    elements = sum(len(fit.alignment.elements) for fit in fits)
-    return {"ELEMENT_COUNT": elements, "RMS": round(math.sqrt(squares / count), 3)}
 
 
 def output_crs(wkt: str | None) -> QgsCoordinateReferenceSystem:

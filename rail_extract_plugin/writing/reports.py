@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,8 +12,6 @@ from ..dialog.parameter_values import ParameterValues
 from ..notices import notices
 
 if TYPE_CHECKING:
-    from ...core.alignment.deviations import Deviations
-    from ...core.alignment.elements import Alignment
     from ...core.rails import RailNetwork
     from ...core.report import Origin
 
@@ -48,34 +46,6 @@ def write_shown(values: ParameterValues, build: Callable[[], str]) -> dict[str, 
     written = write_page(values, "REPORT", path, build())
     notices.report_written.emit(path)
     return written
-
-
-def write_alignment_report(
-    values: ParameterValues,
-    courses: Sequence[tuple[Alignment, Deviations]],
-    source: str,
-    facts: Mapping[str, str],
-    fitted: bool,
-) -> dict[str, str]:
-    """Write the report on alignments; see `write_shown`.
-
-    Parameters
-    ----------
-    values : ParameterValues
-    courses : sequence of (Alignment, Deviations)
-    source : str
-        Name of the measured tracks.
-    facts : mapping of str to str
-        Facts to state by name, besides date, version and coordinate system.
-    fitted : bool
-        Whether the alignments were fitted to the tracks.
-    """
-    from ...core.report import build_alignment_page
-
-    def build() -> str:
-        return build_alignment_page(courses, source, facts, fitted)
-
-    return write_shown(values, build)
 
 
 def write_check(values: ParameterValues, verdict: str, facts: Mapping[str, str]) -> dict[str, str]:

@@ -1,0 +1,264 @@
+"""The values of a run that a command line or Python gives: texts, numbers, and files."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import AbstractContextManager
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Callable
+
+import numpy as np
+
+from ..clouds.crs import parse_crs
+from ..disk import Destination, writing
+from ..errors import CrsError, ParameterError, RailExtractError
+from ..frame import LocalFrame
+from ..jobs import declaration as kinds
+from ..jobs.declaration import Job, Parameter
+from ..jobs.result import Result
+from ..jobs.shared import WEB_PAGES
+from ..jobs.values import Rows, Values
+from ..progress import Progress
+from ..rails import RailLine
+from ..tasks import Runner
+from ..workers.runner import workers
+from .options import vector_module
+
+if TYPE_CHECKING:
+    from ..comparison.tracks import SurveyedLine
+    from .vectors import Features
+
+Spell = Callable[[Parameter], str]
+"""Returns how a front end names a parameter."""
+
+LAYERS, PAGES = (".gpkg", ".dxf", ".csv"), (".html", ".htm")
+"""Suffixes of the files for layers, of which only a GeoPackage holds several, and for web pages."""
+
+
+class FileValues(Values):
+    """Values of the parameters of one run of a job.
+
+    Parameters
+    ----------
+    job : Job
+    given : mapping of str to object
+        Values and files by the name of the parameter or output; None, or none, where one is left empty.
+    command : str
+        What repeats the run.
+
+    Raises
+    ------
+    ParameterError, DiskError
+        A value is wrong, or an output could not be written after the run.
+    """
+
+    def __init__(self, job: Job, given: Mapping[str, Any], command: str) -> None:
+        self.job, self._command, self._features = job, command, dict[str, "Features"]()
+        self._values = {one.name: read_value(one, given.get(one.name)) for one in job.parameters}
+        named = {one.name: given.get(one.name) for one in job.outputs}
+        self.destinations = destinations_of(job, {name: Path(file) for name, file in named.items() if file is not None})
+
+    def __getitem__(self, name: str) -> Any:
+        """Return the value of a parameter, by its kind; None if it is empty, and the WKT of a coordinate system."""
+        return self._values[name]
+
+    @property
+    def command(self) -> str:
+        """What repeats the run."""
+        return self._command
+
+    def filled(self, name: str) -> bool:
+        """Return whether a value was given."""
+        return self._values[name] not in (None, "", ())
+
+    def wanted(self, name: str) -> bool:
+        """Return whether an output is to be written."""
+        return name in self.destinations
+
+    def path(self, name: str) -> Path:
+        """Return the file that an output names, before the run."""
+        return self.destinations[name].path
+
+    def destination(self, name: str) -> Destination:
+        """Return the file of an output that is wanted."""
+        return self.destinations[name]
+
+    def title(self, name: str) -> str:
+        """Return the file that was given for an input; empty without one."""
+        return str(self._values[name] or "")
+
+    def prepare(self, crs_wkt: str | None) -> None:
+        """Do nothing: only QGIS builds its coordinate systems before a run."""
+
+    def runner(self) -> AbstractContextManager[Runner]:
+        """Provide the runner with as many processes as WORKERS asks for."""
+        return workers(self["WORKERS"])
+
+    def system(self, name: str) -> str | None:
+        """Return the coordinate system of a layer as WKT; None if it has none."""
+        return self.features(name).crs_wkt
+
+    def rows(self, name: str, progress: Progress) -> Rows:
+        """Read the fields of a layer."""
+        features = self.features(name)
+        return features.rows(), list(features.columns)
+
+    def tracks(self, name: str, progress: Progress) -> tuple[list[tuple[int, np.ndarray]], LocalFrame]:
+        """Read the number and the vertices, (n, 3) local metres, of each line, and their frame."""
+        return self.features(name).tracks()
+
+    def rails(self, name: str, progress: Progress) -> tuple[list[RailLine], LocalFrame]:
+        """Read rails, in local metres of the frame that is returned as well."""
+        return self.features(name).rails()
+
+    def surveyed(self, name: str, progress: Progress) -> tuple[list[SurveyedLine], LocalFrame]:
+        """Read lines with their standard errors, in local metres of the frame that is returned as well."""
+        return self.features(name).surveyed()
+
+    def features(self, name: str) -> Features:
+        """Read a layer, once."""
+        if name not in self._features:
+            self._features[name] = vector_module(name).read_features(self[name], name)
+        return self._features[name]
+
+
+def run_with_files(job: Job, given: Mapping[str, Any], command: str, progress: Progress, spell: Spell) -> Result:
+    """Run a job and write the outputs that were given; one that fails does not stop the others.
+
+    Parameters
+    ----------
+    job, given, command
+        See `FileValues`.
+    progress : Progress
+    spell : callable
+        Returns how messages name a parameter.
+
+    Raises
+    ------
+    RailExtractError
+        A value is wrong, or an output could not be written.
+    """
+    try:
+        values = FileValues(job, given, command)
+        job.check(values)
+        result = job.run(values, progress)
+        errors = list(_failures(result, values))
+        if len(errors) > 1:
+            raise RailExtractError(" ".join(map(str, errors)))
+        if errors:
+            raise errors[0]
+        return result
+    except RailExtractError as error:
+        error.args = (job.reworded(str(error), spell),)
+        raise
+
+
+def _failures(result: Result, values: FileValues) -> Iterator[RailExtractError]:
+    """Write what is wanted of a result, layers of one file together, and yield the errors."""
+    writers: list[Callable[[], None]] = []
+    layers = {name: make() for name, make in result.layers.items() if values.wanted(name)}
+    for file in dict.fromkeys(values.destination(name).file for name in layers):
+        names = [name for name in layers if values.destination(name).file == file]
+        writing_module = vector_module(names[0], ".output.writing")
+        together = [layers[name] for name in names], values.destination(names[0]), result.frame
+        writers.append(partial(writing_module.write_layers, *together))
+    pages = {name: make for name, make in result.pages.items() if values.wanted(name)}
+    writers += [partial(_write_page, values.destination(name), make) for name, make in pages.items()]
+    for write in writers:
+        try:
+            write()
+        except RailExtractError as error:
+            yield error
+
+
+def _write_page(destination: Destination, make: Callable[[], str]) -> None:
+    destination.write_text(make())
+
+
+def read_value(one: Parameter, given: Any) -> Any:
+    """Return the value of a parameter that was given, its default if nothing was.
+
+    Raises
+    ------
+    ParameterError
+        It is wrong, or missing.
+    """
+    if given is None or (isinstance(given, str) and not given):
+        if one.default is None and not one.optional:
+            raise ParameterError(one.refusal(None))
+        return one.default
+    try:
+        return READERS.get(type(one), lambda one, given: str(given))(one, given)
+    except (TypeError, ValueError):
+        raise ParameterError(one.refusal(given)) from None
+
+
+def _number(one: kinds.Number, given: Any) -> float:
+    value = float(given)
+    if not (one.low <= value <= one.high) or (one.whole and not value.is_integer()):
+        raise ValueError
+    return int(value) if one.whole else value
+
+
+def _chosen(one: kinds.Choice, given: Any) -> Any:
+    """Read a choice: one id, several, or the place of one."""
+    if one.numbered:
+        return range(len(one.options)).index(int(given))
+    if not one.several:
+        return one.options[one.options.index(given)]
+    words = given.split(",") if isinstance(given, str) else given
+    return tuple(one.options[one.options.index(word.strip().upper())] for word in words)
+
+
+def _system(one: kinds.System, given: Any) -> str:
+    """Read a coordinate system.
+
+    Raises
+    ------
+    ParameterError
+    """
+    try:
+        return parse_crs(str(given)).to_wkt()
+    except CrsError:
+        raise ParameterError(f"{one.name} {given} is not a coordinate system: give one such as EPSG:25832.") from None
+
+
+READERS: dict[type, Callable[[Any, Any], Any]] = {
+    kinds.Number: _number,
+    kinds.Flag: lambda one, given: bool(given),
+    kinds.Choice: _chosen,
+    kinds.Text: lambda one, given: given if isinstance(given, str) else ",".join(map(str, given)),
+    kinds.FileInput: lambda one, given: Path(given),
+    kinds.System: _system,
+}
+"""Functions that read a value, by the kind of the parameter; others are texts."""
+
+
+def destinations_of(job: Job, files: Mapping[str, Path]) -> dict[str, Destination]:
+    """Check that outputs can be written, make their folders, and return their destinations.
+
+    Raises
+    ------
+    ParameterError, DiskError
+        A required output is missing, one could not be written after the run, or two are the same file.
+    """
+    found: dict[str, Destination] = {}
+    shared: dict[Path, Destination] = {}
+    for one in job.outputs:
+        if one.name not in files:
+            if not one.optional:
+                raise ParameterError(one.refusal(None))
+            continue
+        path = files[one.name]
+        is_page = isinstance(one, kinds.FileOutput) and one.kinds == WEB_PAGES
+        suffixes = LAYERS if isinstance(one, kinds.LayerOutput) else PAGES if is_page else ()
+        if suffixes and path.suffix.lower() not in suffixes:
+            raise ParameterError(f"{one.name} can't be {path.name}: let it end in {' or '.join(suffixes)}.")
+        with writing(path.parent):
+            path.parent.mkdir(parents=True, exist_ok=True)
+        destination = Destination.at(path)
+        if destination.file in shared and path.suffix.lower() != ".gpkg":
+            raise ParameterError(f"Only a GeoPackage holds several outputs: give {one.name} a file other than {path}.")
+        found[one.name] = shared.setdefault(destination.file, destination)
+    return found
