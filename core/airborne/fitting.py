@@ -23,9 +23,11 @@ from .strips import strip_error
 LONG_GAIN, LONG_SHARE = 7.0, 0.25
 """Gain that two rails must have over 70 m, and the share of the expected gain: roads, hedges and ditches stay below."""
 
-OWN_GAIN, CHANCE = 4.0, 1.5
-"""A section of its own shows a track with this gain, or with one that misses what is expected there by no more than as
-many standard deviations of it: noise gives the expected gain E a standard deviation of the root of 2 E."""
+OWN_GAIN = 4.0
+"""Gain with which a section shows a track by itself."""
+
+CHANCE = 1.5
+"""Standard deviations by which the gain of a section may be below the expected gain E: noise changes it by √(2 E)."""
 
 WIDEST_M = 0.215
 """Ridges this wide are the halves of a road's crown: no survey has the footprint of 0.7 m that would blur rails so."""

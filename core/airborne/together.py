@@ -16,28 +16,43 @@ from .curve import differences, smooth
 from .joint import parallel
 from .sections import STATION_M, Sections
 
-STRAIGHT_M, STRAIGHT_SECTIONS, TURN_SECTIONS = 0.004, 2, 5
-"""Standard deviation of the third differences of a track in plan over 10 m where its curvature does not change, the
-number of sections for which this counts beside what is measured, and the sections over which it is measured: a
-transition is rarely shorter than 50 m."""
+STRAIGHT_M = 0.004
+"""Standard deviation of the third differences of a track in plan, over 10 m, where its curvature does not change."""
 
-APART_M, APART_SECTIONS = 0.004, 5
-"""Standard deviation of the second differences over 10 m of the distance between two tracks, which in a curve of 300 m
-radius turns by as much, and the number of sections for which it counts beside what is measured."""
+STRAIGHT_SECTIONS = 2
+"""Sections for which `STRAIGHT_M` counts beside what is measured."""
+
+TURN_SECTIONS = 5
+"""Sections over which the third differences are measured: a transition is rarely shorter than 50 m."""
+
+APART_M = 0.004
+"""Standard deviation of the second differences, over 10 m, of the distance between two tracks: it changes by as much in
+a curve of 300 m radius."""
+
+APART_SECTIONS = 5
+"""Sections for which `APART_M` counts beside what is measured."""
 
 FIRST_TURN_M, FIRST_APART_M = 0.03, 0.3
 """Standard deviations with which the search for both begins: a curve of 300 m radius whose transition is 60 m long has
 third differences of 0.056 m, the toe of a switch 0.3 m; its tracks part with second differences of 0.3 to 0.5 m."""
 
-CURVE_PASSES, OUTLIER, TRUSTED = 12, 3.0, 0.2
-"""Weightings of the curve, after which it hardly moves, the residual, in standard errors, at which a section has lost
-3/4 of its weight, and the weight above which it states how good the standard errors are."""
+CURVE_PASSES = 12
+"""Weightings of the curve, after which it hardly moves."""
+
+OUTLIER = 3.0
+"""Residual, in standard errors, at which a section has lost 3/4 of its weight."""
+
+TRUSTED = 0.2
+"""Least weight of the sections whose residuals judge the standard errors."""
 
 HOLD_M = 0.3
 """Standard error of the place of a section that is not seen: it stays where the last curve passed."""
 
-FEW_SECTIONS, SPREAD = 5, (0.5, 3.0)
-"""Sections up to which residuals do not say how good the standard errors are, and the limits of what they say."""
+FEW_SECTIONS = 5
+"""Sections up to which residuals do not judge the standard errors."""
+
+SPREAD = (0.5, 3.0)
+"""Limits of the factor by which residuals correct the standard errors."""
 
 TURNED = 0.02
 """Sine of the angle between two lines below which they keep their distance: branches of switches turn by more."""
