@@ -13,16 +13,16 @@ from .core.jobs import CALLS
 
 PROGRAM = "python -m rail_extract"
 
-POINTS, JOB = "core.commands.points", "core.commands.jobs"
+JOB = "core.commands.jobs"
 
 COMMANDS = {
     "extract": ("core.commands.extract.extract", "extract rails and track centerlines on several cores or computers"),
-    "classify": (f"{POINTS}.classify", "find the rail points of raw clouds and write classified copies"),
-    "grow": (f"{POINTS}.grow", "follow rails from seeds and write classified copies of the clouds"),
-    "airborne": ("core.commands.airborne.airborne", "fit track centerlines in airborne clouds along guides"),
     **{name.replace("_", "-"): (f"{JOB}.{name}", job.summary) for name, job in CALLS.items()},
     "stations": ("core.commands.lines.stations", "give features their kilometre along an axis"),
-    "train-classifier": (f"{POINTS}.train_classifier", "train a classifier of rail points on labelled clouds"),
+    "train-classifier": (
+        "core.commands.points.train_classifier",
+        "train a classifier of rail points on labelled clouds",
+    ),
     "onnx": ("core.frpdf.onnx.add_arguments", "write the network for other runtimes"),
     "train": ("laboratory.training.train.add_arguments", "train the network on synthetic rasters"),
     "evaluate": ("laboratory.training.evaluate.add_arguments", "compare weights on a fixed set of synthetic rasters"),

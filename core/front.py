@@ -14,7 +14,6 @@ from tempfile import TemporaryDirectory
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
-from .classify.settings import Settings
 from .clouds.points import ask
 from .clouds.readers import Extent, Paths, paths_of
 from .commands.files import run_with_files
@@ -23,13 +22,11 @@ from .errors import ParameterError
 from .jobs import CALLS
 from .jobs.declaration import Job
 from .jobs.result import Result
-from .labelling.files import Choice, classify_files, plan_output
 from .parameters import DEFAULT_STEP_M, Parameters
 from .pipeline import extract_files
 from .progress import SILENT, Progress
-from .rails import RailNetwork, SearchFigures
+from .rails import RailNetwork
 from .report import Origin
-from .scratch import scratch_folder
 from .standards import DEFAULT, RAIL_CLASS, SEARCHED_CLASSES, resolve
 from .workers.runner import workers as workers_of
 
@@ -191,52 +188,6 @@ def extract(
     return Network(**vars(found), origin=Origin(paths, profile, settings.gauges[1:], command, settings))
 
 
-def classify(
-    clouds: Paths,
-    output: str | Path,
-    standard: str = DEFAULT,
-    *,
-    rail_class: int = RAIL_CLASS,
-    crs: str | None = None,
-    workers: int = 1,
-    progress: Progress = SILENT,
-) -> SearchFigures:
-    """Find the rail points of raw clouds, and write a copy of the clouds in which they have the rail class.
-
-    Parameters
-    ----------
-    clouds : path or sequence of paths
-    output : path
-        LAZ or LAS file; for several tiles, the .vpc file beside the folder of the new tiles.
-    standard : str
-        Name of a rail standard.
-    rail_class : int
-        Class that the rail points get.
-    crs : str, optional
-        Coordinate system of files that state none.
-    workers : int
-        Processes that compute; 0 is one per core, as far as memory allows.
-    progress : Progress
-
-    Returns
-    -------
-    SearchFigures
-        How much was found.
-
-    Raises
-    ------
-    RailExtractError
-        A cloud can't be read, or the copy can't be written.
-    """
-    profile = resolve(standard)
-    paths = paths_of(clouds)
-    planned = plan_output(paths, Path(output), rail_class, progress)
-    request = ask(paths, SEARCHED_CLASSES, crs, None, progress)
-    settings = Settings((profile.gauge_m,), profile.head_width_m)
-    with scratch_folder(planned.file.parent) as folder, workers_of(workers) as runner:
-        return classify_files(request, settings, Choice(rail_class), planned, folder, runner, progress).figures
-
-
 def __getattr__(name: str) -> Callable[..., Result]:
     """Return a job as a function."""
     if name not in CALLS:
@@ -249,7 +200,7 @@ def function_of(job: Job) -> Callable[..., Result]:
 
     What must be given comes first; files of outputs may be left out, because the result writes them as well.
     """
-    stated = sorted((*job.parameters, *job.outputs), key=lambda one: not one.is_input)
+    stated = sorted((*job.parameters, *job.outputs), key=lambda one: not one.required)
 
     def call(*args: Any, **given: Any) -> Result:
         values = signature.bind(*args, **given).arguments
@@ -257,11 +208,11 @@ def function_of(job: Job) -> Callable[..., Result]:
         plain = {name: str(value) if isinstance(value, Path) else value for name, value in values.items()}
         command = f"rail_extract.{job.call}({', '.join(f'{name}={value!r}' for name, value in plain.items())})"
         named = {name.upper(): value for name, value in values.items()}
-        return run_with_files(job, named, command, progress, lambda one: one.name.lower())
+        return run_with_files(job, named, command, progress, lambda one: one.name.lower(), keeps=True)
 
     first, later = Parameter.POSITIONAL_OR_KEYWORD, Parameter.KEYWORD_ONLY
     arguments = [
-        Parameter(one.name.lower(), first) if one.is_input else Parameter(one.name.lower(), later, default=one.default)
+        Parameter(one.name.lower(), first) if one.required else Parameter(one.name.lower(), later, default=one.default)
         for one in stated
     ]
     signature = Signature([*arguments, Parameter("progress", later, default=SILENT)], return_annotation=Result)

@@ -2,30 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from contextlib import AbstractContextManager
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, Callable
 
 import numpy as np
 
-from ..clouds.crs import parse_crs
+from ..clouds.crs import MAX_COORDINATE, is_geographic, parse_crs
+from ..clouds.readers import CATALOGUE, paths_of
 from ..disk import Destination, writing
 from ..errors import CrsError, ParameterError, RailExtractError
 from ..frame import LocalFrame
 from ..jobs import declaration as kinds
+from ..jobs.clouds import Bounds, CloudSource, checked_crs
 from ..jobs.declaration import Job, Parameter
 from ..jobs.result import Result
 from ..jobs.shared import WEB_PAGES
 from ..jobs.values import Rows, Values
 from ..progress import Progress
 from ..rails import RailLine
+from ..scratch import scratch_folder
 from ..tasks import Runner
 from ..workers.runner import workers
 from .options import vector_module
 
 if TYPE_CHECKING:
+    from ..airborne.survey import Guide
     from ..comparison.tracks import SurveyedLine
     from .vectors import Features
 
@@ -46,6 +52,8 @@ class FileValues(Values):
         Values and files by the name of the parameter or output; None, or none, where one is left empty.
     command : str
         What repeats the run.
+    keeps : bool
+        Whether the result stays after the run.
 
     Raises
     ------
@@ -53,8 +61,8 @@ class FileValues(Values):
         A value is wrong, or an output could not be written after the run.
     """
 
-    def __init__(self, job: Job, given: Mapping[str, Any], command: str) -> None:
-        self.job, self._command, self._features = job, command, dict[str, "Features"]()
+    def __init__(self, job: Job, given: Mapping[str, Any], command: str, keeps: bool = False) -> None:
+        self.job, self._command, self._keeps, self._features = job, command, keeps, dict[str, "Features"]()
         self._values = {one.name: read_value(one, given.get(one.name)) for one in job.parameters}
         named = {one.name: given.get(one.name) for one in job.outputs}
         self.destinations = destinations_of(job, {name: Path(file) for name, file in named.items() if file is not None})
@@ -116,6 +124,46 @@ class FileValues(Values):
         """Read lines with their standard errors, in local metres of the frame that is returned as well."""
         return self.features(name).surveyed()
 
+    @property
+    def keeps(self) -> bool:
+        """Whether the result stays after the run, so that its layers can be had without naming files."""
+        return self._keeps
+
+    def cloud(self, name: str = "INPUT") -> CloudSource:
+        """Return the files of a cloud, and which of their points count."""
+        source = CloudSource(tuple(paths_of(self[name])), self["CRS"], leave_out=self._values.get("LEAVE_OUT") or ())
+        if not (self.has("MASK") and self.filled("MASK")):
+            return source
+        return replace(source, mask=vector_module("MASK").read_mask(self["MASK"], checked_crs(source)))
+
+    def extent(self, crs_wkt: str | None) -> Bounds | None:
+        """Return EXTENT, which is in the coordinate system of the cloud."""
+        return self["EXTENT"]
+
+    @contextmanager
+    def scratch(self) -> Iterator[Path]:
+        """Provide a folder for the points of a run: next to the first output, where there is space for it."""
+        if not self.destinations:
+            with TemporaryDirectory() as folder:
+                yield Path(folder)
+            return
+        parent = next(iter(self.destinations.values())).file.parent
+        with writing(parent), scratch_folder(parent) as folder:
+            yield folder
+
+    def lines_along(self, name: str, crs_wkt: str | None) -> list[np.ndarray]:
+        """Read lines that show places along tracks, (k, 2) each, in a coordinate system."""
+        return vector_module(name).read_lines(self[name], crs_wkt)
+
+    def guides(self, name: str, crs_wkt: str | None) -> list[Guide]:
+        """Read such lines with what they state of their tracks."""
+        return vector_module(name).read_guides(self[name], crs_wkt)
+
+    def seeds(self, crs_wkt: str | None) -> list[np.ndarray]:
+        """Read SEEDS and SEED in a coordinate system: points, (1, 2), and lines, (k, 2)."""
+        found = vector_module("SEEDS").read_seeds(self["SEEDS"], crs_wkt) if self.filled("SEEDS") else []
+        return [*found, *(np.array([place]) for place in self._values.get("SEED") or ())]
+
     def features(self, name: str) -> Features:
         """Read a layer, once."""
         if name not in self._features:
@@ -123,12 +171,14 @@ class FileValues(Values):
         return self._features[name]
 
 
-def run_with_files(job: Job, given: Mapping[str, Any], command: str, progress: Progress, spell: Spell) -> Result:
+def run_with_files(
+    job: Job, given: Mapping[str, Any], command: str, progress: Progress, spell: Spell, keeps: bool = False
+) -> Result:
     """Run a job and write the outputs that were given; one that fails does not stop the others.
 
     Parameters
     ----------
-    job, given, command
+    job, given, command, keeps
         See `FileValues`.
     progress : Progress
     spell : callable
@@ -140,9 +190,11 @@ def run_with_files(job: Job, given: Mapping[str, Any], command: str, progress: P
         A value is wrong, or an output could not be written.
     """
     try:
-        values = FileValues(job, given, command)
+        values = FileValues(job, given, command, keeps)
         job.check(values)
         result = job.run(values, progress)
+        for name in sorted(set(values.destinations) - {*result.layers, *result.pages, *result.figures}):
+            progress.warning(f"{name} is not written: a run with these inputs does not make it.")
         errors = list(_failures(result, values))
         if len(errors) > 1:
             raise RailExtractError(" ".join(map(str, errors)))
@@ -185,9 +237,9 @@ def read_value(one: Parameter, given: Any) -> Any:
         It is wrong, or missing.
     """
     if given is None or (isinstance(given, str) and not given):
-        if one.default is None and not one.optional:
+        if one.required:
             raise ParameterError(one.refusal(None))
-        return one.default
+        return None if given == "" and one.optional else one.default
     try:
         return READERS.get(type(one), lambda one, given: str(given))(one, given)
     except (TypeError, ValueError):
@@ -219,9 +271,48 @@ def _system(one: kinds.System, given: Any) -> str:
     ParameterError
     """
     try:
-        return parse_crs(str(given)).to_wkt()
+        crs = parse_crs(str(given))
     except CrsError:
         raise ParameterError(f"{one.name} {given} is not a coordinate system: give one such as EPSG:25832.") from None
+    if is_geographic(crs):
+        raise ParameterError(
+            f"{one.name} {given} is in degrees, where lengths can't be measured: give a projected one."
+        )
+    return crs.to_wkt()
+
+
+def _extent(one: kinds.Extent, given: Any) -> Bounds:
+    """Read a rectangle; the order of its numbers is that of command lines and Python, not that of QGIS.
+
+    Raises
+    ------
+    ParameterError
+    """
+    try:
+        xmin, ymin, xmax, ymax = map(float, given.split(",") if isinstance(given, str) else given)
+    except (TypeError, ValueError):
+        raise ParameterError(f'{one.name} "{given}" should be four numbers: xmin,ymin,xmax,ymax.') from None
+    return xmin, ymin, xmax, ymax
+
+
+def _places(one: kinds.Place, given: Any) -> list[tuple[float, float]]:
+    """Read one place or several, as texts or as pairs of numbers.
+
+    Raises
+    ------
+    ParameterError
+    """
+    several = isinstance(given, Sequence) and not isinstance(given, str) and not isinstance(given[0], (int, float))
+    found = []
+    for place in given if several else [given]:
+        try:
+            x, y = map(float, place.split(",") if isinstance(place, str) else place)
+            if not max(abs(x), abs(y)) <= MAX_COORDINATE:
+                raise ValueError
+        except (TypeError, ValueError):
+            raise ParameterError(f'{one.name} "{place}" should be two numbers: x,y.') from None
+        found.append((x, y))
+    return found
 
 
 READERS: dict[type, Callable[[Any, Any], Any]] = {
@@ -231,6 +322,9 @@ READERS: dict[type, Callable[[Any, Any], Any]] = {
     kinds.Text: lambda one, given: given if isinstance(given, str) else ",".join(map(str, given)),
     kinds.FileInput: lambda one, given: Path(given),
     kinds.System: _system,
+    kinds.Extent: _extent,
+    kinds.Place: _places,
+    kinds.Cloud: lambda one, given: paths_of(given),
 }
 """Functions that read a value, by the kind of the parameter; others are texts."""
 
@@ -247,10 +341,12 @@ def destinations_of(job: Job, files: Mapping[str, Path]) -> dict[str, Destinatio
     shared: dict[Path, Destination] = {}
     for one in job.outputs:
         if one.name not in files:
-            if not one.optional:
+            if one.required:
                 raise ParameterError(one.refusal(None))
             continue
         path = files[one.name]
+        if isinstance(one, kinds.FileOutput) and CATALOGUE in one.kinds and not path.suffix:
+            path = path.with_suffix(CATALOGUE)
         is_page = isinstance(one, kinds.FileOutput) and one.kinds == WEB_PAGES
         suffixes = LAYERS if isinstance(one, kinds.LayerOutput) else PAGES if is_page else ()
         if suffixes and path.suffix.lower() not in suffixes:

@@ -29,22 +29,29 @@ def declare(job: Job, parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("outputs", "Existing files are replaced. GeoPackages may be the same file.")
     for output in job.outputs:
         group.add_argument(
-            option(output), dest=output.name, required=not output.optional, metavar="FILE", help=_help(output)
+            option(output), dest=output.name, required=output.required, metavar="FILE", help=_help(output)
         )
     parser.set_defaults(run=partial(_run, job))
 
 
 def option(one: Parameter) -> str:
     """Return how a command line names a parameter or an output."""
-    return one.name if one.is_input else f"--{one.name.lower().replace('_', '-')}"
+    return one.name if is_positional(one) else f"--{one.name.lower().replace('_', '-')}"
+
+
+def is_positional(one: Parameter) -> bool:
+    """Return whether a parameter has no option, because it must be given."""
+    return isinstance(one, kinds.Input) and one.required
 
 
 def _add(one: Parameter, parser: argparse.ArgumentParser) -> None:
     """Declare the argument of a parameter, whose value is checked later, as a dialog does."""
     if isinstance(one, kinds.Flag):
         parser.add_argument(option(one), dest=one.name, action=argparse.BooleanOptionalAction, help=_help(one))
-    elif one.is_input:
+    elif is_positional(one):
         parser.add_argument(one.name, nargs="+" if isinstance(one, kinds.Cloud) else None, help=_help(one))
+    elif isinstance(one, kinds.Place):
+        parser.add_argument(option(one), dest=one.name, action="append", metavar="X,Y", help=_help(one))
     else:
         parser.add_argument(option(one), dest=one.name, metavar=_metavar(one), help=_help(one))
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import math
 import signal
 import sys
 from collections.abc import Callable, Mapping, Sequence
@@ -198,40 +197,6 @@ def gauges_of(args: argparse.Namespace, standard: RailStandard, tolerance_m: flo
     """
     own_m = Parameters.centerline_tolerance_m if tolerance_m is None else tolerance_m
     return read_gauges(args.other_gauges, "--other-gauges", standard, own_m, tolerance_m is not None)
-
-
-def positive(text: str) -> float:
-    """Return a length that an option states.
-
-    Raises
-    ------
-    argparse.ArgumentTypeError
-        It is not a positive number.
-    """
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not 0 < value < math.inf:
-        raise argparse.ArgumentTypeError(f"{text} is not a positive number")
-    return value
-
-
-def add_length(parser: argparse._ActionsContainer, option: str, default: float, text: str, unit: str = "M") -> None:
-    """Declare an option that states a length."""
-    help_text = f"{text} (default: {default:g})"
-    parser.add_argument(option, type=positive, default=default, metavar=unit, help=help_text)
-
-
-def add_lengths(parser: argparse._ActionsContainer, texts: Mapping[str, str], defaults: type) -> None:
-    """Declare an option for each length, an attribute of `defaults` without its unit."""
-    for name, text in texts.items():
-        add_length(parser, f"--{name.replace('_', '-')}", getattr(defaults, f"{name}_m"), text)
-
-
-def lengths_of(args: argparse.Namespace, texts: Mapping[str, str]) -> dict[str, float]:
-    """Return the lengths of `add_lengths` as arguments of the class of the defaults."""
-    return {f"{name}_m": getattr(args, name) for name in texts}
 
 
 def numbers_in(text: str, option: str, kind: type) -> tuple:

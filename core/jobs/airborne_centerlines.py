@@ -3,8 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
+from ..errors import ParameterError
+from ..fields import AIRBORNE, PROPOSED
 from ..parameters import AIRBORNE_CLASSES, AirborneParameters
+from ..progress import Estimating
+from ..standards import SEARCHED_CLASSES
 from . import shared
 from .declaration import (
     CLOUD_NEEDS,
@@ -19,9 +24,87 @@ from .declaration import (
     Number,
     Text,
 )
+from .values import class_numbers
+
+if TYPE_CHECKING:
+    from ..airborne.proposals import Proposals
+    from ..airborne.survey import Survey
+    from ..progress import Progress
+    from .result import Result
+    from .values import Values
 
 MAX_GUIDE_REACH_M, MAX_FOOTPRINT_M, MAX_RAIL_M = 6.0, 2.0, 0.5
 """Beyond, a guide means another track, a footprint covers both rails, and a rail is not a rail."""
+
+
+def _check(values: Values) -> None:
+    """Check the rail, the classes and the guides, and that there are some or are to be some."""
+    values.airborne(values.standard())
+    _class_codes(values)
+    if values.filled("GUIDE"):
+        values.guides("GUIDE", values.cloud_crs())
+    elif not values.wanted("PROPOSED") and not values.keeps:
+        raise ParameterError("GUIDE is empty: choose lines along the tracks, or PROPOSED to have some proposed.")
+
+
+def _class_codes(values: Values) -> tuple[int, ...]:
+    """Return the classes to use; all but noise if none is named."""
+    return class_numbers(values["CLASSES"], "CLASSES") if values.filled("CLASSES") else SEARCHED_CLASSES
+
+
+def _run(values: Values, progress: Progress) -> Result:
+    """Fit the tracks, or propose guides where there are none."""
+    from ..airborne.files import survey_files
+    from ..airborne.proposals import propose_guides
+    from ..airborne.run import Run
+    from .result import ShownCloud
+
+    progress, standard, codes = Estimating(progress), values.standard(), _class_codes(values)
+    request = values.request(codes, progress)
+    with values.runner() as runner, values.scratch() as folder:
+        run = Run(request, values.airborne(standard), folder / "points", runner, progress)
+        if values.filled("GUIDE"):
+            made = _fitted(survey_files(run, values.guides("GUIDE", values.cloud_crs())), values)
+        else:
+            made = _proposed(propose_guides(run))
+    return replace(made, cloud=ShownCloud("INPUT", codes, standard.head_width_m))
+
+
+def _proposed(found: Proposals) -> Result:
+    """Return the proposed guides as a result."""
+    from ..output.layers import lines_layer
+    from .result import Result
+
+    figures = {"PROPOSED_LENGTH": found.length_m, "DENSITY": round(found.density, 1)}
+    layers = {"PROPOSED": lambda: lines_layer(PROPOSED, found.guides)}
+    return Result(figures, found.frame, layers, sentences=(found.summary,))
+
+
+def _fitted(survey: Survey, values: Values) -> Result:
+    """Return what was found along the guides as a result."""
+    from ..output.layers import airborne_stations_layer, findings_layer, lines_layer
+    from ..report.airborne import airborne_findings, airborne_page, airborne_summary
+    from .result import Result
+
+    facts = {"Rail": values.standard().label, "Command": values.command}
+    figures: dict[str, Any] = {
+        **shared.figures_of(survey.lines, "CENTERLINE"),
+        "GUIDE_LENGTH": survey.guides_m,
+        "SEEN_LENGTH": survey.seen_m,
+        "DENSITY": round(survey.density, 1),
+    }
+    return Result(
+        figures,
+        survey.frame,
+        {
+            "CENTERLINES": lambda: lines_layer(AIRBORNE, survey.lines),
+            "STATIONS": lambda: airborne_stations_layer(survey.tracks),
+            "FINDINGS": lambda: findings_layer(airborne_findings(survey)),
+        },
+        {"REPORT": lambda: airborne_page(survey, values.cloud().paths[0].resolve().name, facts)},
+        tuple(airborne_summary(survey)),
+    )
+
 
 JOB = Job(
     "airbornecenterlines",
@@ -118,4 +201,7 @@ JOB = Job(
     picture="gauge.svg",
     guide="airborne",
     pages=("airborne", "parameters"),
+    call="airborne",
+    check=_check,
+    run=_run,
 )

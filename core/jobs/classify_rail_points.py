@@ -2,9 +2,70 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
+from ..errors import ParameterError
 from ..parameters import DEFAULT_GUIDE_DISTANCE_M
+from ..progress import Estimating
+from ..standards import SEARCHED_CLASSES
 from . import shared
 from .declaration import CLOUD_NEEDS, CLOUD_WORDS, RAIL_WORDS, RAW_CLOUDS, Flag, Job, Number
+
+if TYPE_CHECKING:
+    from ..clouds.points import Request
+    from ..labelling.files import Result as Found
+    from ..progress import Progress
+    from .result import Result
+    from .values import Values
+
+
+def _check(values: Values) -> None:
+    """Check the rail, the guide, the classifier and the output."""
+    from ..labelling.files import plan_output
+
+    values.other_gauges(values.standard())
+    if values.filled("GUIDE"):
+        values.lines_along("GUIDE", values.cloud_crs())
+    elif values["ONLY_GUIDED"]:
+        raise ParameterError("ONLY_GUIDED needs lines to compare tracks with: choose GUIDE.")
+    values.weights()
+    plan_output(values.cloud().paths, values.path("OUTPUT"), values["RAIL_CLASS"])
+
+
+def _run(values: Values, progress: Progress) -> Result:
+    """Classify the cloud and write the copy."""
+    from ..classify.settings import Settings
+    from ..labelling.files import Choice, classify_files, plan_output
+    from ..labelling.finding import guide_of
+
+    progress, standard = Estimating(progress), values.standard()
+    gauges_m = (standard.gauge_m, *(gauge_m for gauge_m, _ in values.other_gauges(standard)))
+    choice = Choice(values["RAIL_CLASS"], values.rails_only(), values["RESET"])
+    output = plan_output(values.cloud().paths, values.path("OUTPUT"), choice.class_code, progress)
+    request, guide = values.request(SEARCHED_CLASSES, progress), None
+    if values.filled("GUIDE"):
+        lines = values.lines_along("GUIDE", values.cloud_crs())
+        guide = guide_of(request, lines, values["GUIDE_DISTANCE"], values["ONLY_GUIDED"])
+    settings = Settings(gauges_m, standard.head_width_m, values["KEEP_SINGLE"], guide, values.weights())
+    with values.scratch() as folder, values.runner() as runner:
+        return classified(classify_files(request, settings, choice, output, folder, runner, progress), request)
+
+
+def classified(found: Found, request: Request) -> Result:
+    """Return the result of a job that writes a classified copy."""
+    from .result import Result
+
+    figures = {
+        "OUTPUT": str(found.file),
+        "POINT_COUNT": found.point_count,
+        "RAIL_POINTS": found.figures.points,
+        "PAIRED_LENGTH": found.figures.paired_m,
+        "SINGLE_LENGTH": found.figures.single_m,
+        "CELLS_PER_M": found.figures.cells_per_m,
+    }
+    said = f"{found.figures.points} of {found.point_count} points are on rails"
+    return Result(figures, request.zero, sentences=(said,))
+
 
 JOB = Job(
     "classifyrailpoints",
@@ -65,4 +126,7 @@ JOB = Job(
     shared.CLASSIFIED_FIGURES,
     RAW_CLOUDS,
     picture="gauge.svg",
+    call="classify",
+    check=_check,
+    run=_run,
 )

@@ -61,9 +61,9 @@ class Parameter:
     default: Any = None
 
     @property
-    def is_input(self) -> bool:
+    def required(self) -> bool:
         """Whether it must be given: there is no default."""
-        return False
+        return self.default is None and not self.optional
 
     @property
     def accepted(self) -> str:
@@ -117,12 +117,7 @@ class Text(Parameter):
 
 @dataclass(frozen=True)
 class Input(Parameter):
-    """What is read, or tells how something is to be read; without a default."""
-
-    @property
-    def is_input(self) -> bool:
-        """See `Parameter`."""
-        return not self.optional
+    """What is read, or how it is to be read; without a default."""
 
 
 @dataclass(frozen=True)
@@ -132,9 +127,10 @@ class Cloud(Input):
 
 @dataclass(frozen=True)
 class LayerInput(Input):
-    """A vector layer of one of some kinds."""
+    """A vector layer of one of some kinds; `transformed` if it may have another coordinate system than the cloud."""
 
     kinds: tuple[str, ...] = (LINE,)
+    transformed: bool = False
     accepted = "a vector layer, or a vector file that can be read"
 
 

@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
+from ..errors import ParameterError
 from ..parameters import GrowParameters
+from ..progress import Estimating
+from ..standards import SEARCHED_CLASSES
 from . import shared
+from .classify_rail_points import classified
 from .declaration import (
     CLOUD_NEEDS,
     CLOUD_WORDS,
@@ -19,6 +24,11 @@ from .declaration import (
     Parameter,
     Place,
 )
+
+if TYPE_CHECKING:
+    from ..progress import Progress
+    from .result import Result
+    from .values import Values
 
 _GROWTH: tuple[Parameter, ...] = (
     Flag(
@@ -89,6 +99,37 @@ _GROWTH: tuple[Parameter, ...] = (
     ),
 )
 
+
+def _check(values: Values) -> None:
+    """Check the rail, the seeds and the output."""
+    from ..labelling.files import plan_output
+
+    values.standard()
+    if not values.filled("SEEDS") and not values.filled("SEED"):
+        raise ParameterError("A rail is followed from seeds: choose a layer for SEEDS, or pick a point for SEED.")
+    values.seeds(values.cloud_crs())
+    plan_output(values.cloud().paths, values.path("OUTPUT"), values["RAIL_CLASS"])
+
+
+def _run(values: Values, progress: Progress) -> Result:
+    """Follow the rails and write the copy."""
+    from ..grow.settings import GrowSettings
+    from ..labelling.files import Choice, plan_output
+    from ..labelling.growing import grow_files
+    from ..output.layers import stops_layer
+    from ..tasks import InTurn
+
+    progress, standard = Estimating(progress), values.standard()
+    choice = Choice(values["RAIL_CLASS"], values.rails_only(), reset=False)
+    output = plan_output(values.cloud().paths, values.path("OUTPUT"), choice.class_code, progress)
+    request = values.request(SEARCHED_CLASSES, progress)
+    settings = GrowSettings(standard.gauge_m, standard.head_width_m, values.growth())
+    seeds = values.seeds(values.cloud_crs())
+    with values.scratch() as folder:
+        grown = grow_files(request, seeds, settings, choice, output, folder, InTurn(), progress)
+    return replace(classified(grown, request), layers={"STOPS": lambda: stops_layer(grown.stops)})
+
+
 JOB = Job(
     "growrailpoints",
     "Grow rail points from seeds",
@@ -131,4 +172,7 @@ JOB = Job(
     shared.CLASSIFIED_FIGURES,
     RAW_CLOUDS,
     picture="gauge.svg",
+    call="grow",
+    check=_check,
+    run=_run,
 )

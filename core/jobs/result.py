@@ -18,6 +18,16 @@ if TYPE_CHECKING:
 
     from ..frame import LocalFrame
 
+
+@dataclass(frozen=True)
+class ShownCloud:
+    """The points of a run, which its layers remember: the parameter of the cloud, classes, and width of the heads."""
+
+    name: str
+    class_codes: tuple[int, ...]
+    head_width_m: float
+
+
 FORMATS = (".gpkg", ".dxf", ".csv")
 """File name suffixes of layers."""
 
@@ -38,6 +48,7 @@ class Result:
         Makes a web page, by the name of the output.
     sentences : tuple of str
         The result in words.
+    cloud : ShownCloud, optional
     """
 
     figures: Mapping[str, Any]
@@ -45,6 +56,7 @@ class Result:
     layers: Mapping[str, Callable[[], Layer]] = field(default_factory=dict)
     pages: Mapping[str, Callable[[], str]] = field(default_factory=dict)
     sentences: tuple[str, ...] = ()
+    cloud: ShownCloud | None = None
 
     def to_geodataframe(self, layer: str) -> geopandas.GeoDataFrame:
         """Return a layer as a table, with the fields of docs/reference.md and the coordinate system.

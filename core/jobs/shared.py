@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 from ..alignment.km_text import HECTOMETRES, NOTATIONS
 from ..design_numbers import KM
+from ..fields import LENGTH
 from ..frpdf import DEVICES, ENGINES, MAX_PASSES
 from ..frpdf.models import NAMES
 from ..parameters import (
@@ -171,6 +174,7 @@ AREA: tuple[Parameter, ...] = (
         "Only points inside these polygons are read, for example a strip along the line.",
         advanced=True,
         optional=True,
+        transformed=True,
         kinds=(POLYGON,),
     ),
     CRS,
@@ -184,6 +188,7 @@ GUIDE = LayerInput(
     "Lines in another coordinate system are transformed.",
     advanced=True,
     optional=True,
+    transformed=True,
 )
 SEEDS = LayerInput(
     "SEEDS",
@@ -191,6 +196,7 @@ SEEDS = LayerInput(
     "Points on railheads, or lines along them, one for each rail or track to follow. In another coordinate system they "
     "are transformed. The map tool Grow Rails makes such a layer.",
     optional=True,
+    transformed=True,
     kinds=(POINT, LINE),
 )
 METHOD: tuple[Parameter, ...] = (
@@ -413,6 +419,7 @@ def axis(optional: bool) -> tuple[Parameter, ...]:
             "another coordinate system it is transformed.",
             advanced=optional,
             optional=optional,
+            transformed=True,
         ),
         Number(
             "START_KM",
@@ -439,6 +446,7 @@ def axis(optional: bool) -> tuple[Parameter, ...]:
             "them. They override the start and M values.",
             advanced=optional,
             optional=True,
+            transformed=True,
             kinds=(POINT,),
         ),
         *_NOTATION,
@@ -558,3 +566,8 @@ ALIGNMENT_FIGURES = (
     Figure("ELEMENT_COUNT", "Number of elements"),
 )
 ENGINE_USED = Figure("ENGINE_USED", "Engine that ran the network", "text")
+
+
+def figures_of(lines: Sequence[Any], what: str) -> dict[str, Any]:
+    """Return the number and length of lines: RAIL_COUNT and RAIL_LENGTH if `what` is RAIL."""
+    return {f"{what}_COUNT": len(lines), f"{what}_LENGTH": LENGTH.value(sum(line.length_m for line in lines))}

@@ -23,11 +23,14 @@ from ..standards import (
     read_gauges,
     resolve,
 )
+from .clouds import Bounds, CloudSource, checked_crs, request_points
 from .declaration import Job
 
 if TYPE_CHECKING:
     import numpy as np
 
+    from ..airborne.survey import Guide
+    from ..clouds.points import Request
     from ..comparison.tracks import SurveyedLine
     from ..frame import LocalFrame
     from ..progress import Progress
@@ -132,6 +135,44 @@ class Values(ABC):
     @abstractmethod
     def surveyed(self, name: str, progress: Progress) -> tuple[Sequence[SurveyedLine], LocalFrame]:
         """Read lines with their standard errors, in local metres of the frame that is returned as well."""
+
+    @abstractmethod
+    def cloud(self, name: str = "INPUT") -> CloudSource:
+        """Return the files of a cloud, and which of their points count."""
+
+    @abstractmethod
+    def extent(self, crs_wkt: str | None) -> Bounds | None:
+        """Read EXTENT in a coordinate system."""
+
+    @abstractmethod
+    def scratch(self) -> AbstractContextManager[Path]:
+        """Provide a folder for the points of a run."""
+
+    @abstractmethod
+    def lines_along(self, name: str, crs_wkt: str | None) -> Sequence[np.ndarray]:
+        """Read lines that show places along tracks, (k, 2) each, in a coordinate system."""
+
+    @abstractmethod
+    def guides(self, name: str, crs_wkt: str | None) -> Sequence[Guide]:
+        """Read such lines with what they state of their tracks."""
+
+    @abstractmethod
+    def seeds(self, crs_wkt: str | None) -> Sequence[np.ndarray]:
+        """Read SEEDS and SEED in a coordinate system: points, (1, 2), and lines, (k, 2)."""
+
+    @property
+    def keeps(self) -> bool:
+        """Whether the result stays after the run, so that its layers can be had without naming files."""
+        return False
+
+    def request(self, class_codes: Sequence[int], progress: Progress) -> Request:
+        """Check which points are to be read, and read the headers of the files."""
+        bounds = self.extent if self.has("EXTENT") else lambda _: None
+        return request_points(self.cloud(), class_codes, bounds, progress)
+
+    def cloud_crs(self) -> str | None:
+        """Return the coordinate system of the cloud; see `checked_crs`."""
+        return checked_crs(self.cloud())
 
     def has(self, name: str) -> bool:
         """Return whether the job has a parameter."""

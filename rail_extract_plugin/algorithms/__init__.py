@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
-from ...core.jobs import compare_tracks, export_alignment, fit_alignment, import_alignment
+from ...core.jobs import (
+    airborne_centerlines,
+    classify_rail_points,
+    compare_tracks,
+    export_alignment,
+    fit_alignment,
+    grow_rail_points,
+    import_alignment,
+)
 from ...core.jobs.declaration import Job
-from .airborne_centerlines import AirborneCenterlines
 from .base import JobAlgorithm, RailAlgorithm
 from .build_track_centerlines import BuildTrackCenterlines
 from .check_installation import CheckInstallation
-from .classify_rail_points import ClassifyRailPoints
 from .extract_rails import ExtractRails
 from .frpdf_cleanup import FrpdfCleanup
-from .grow_rail_points import GrowRailPoints
 from .install_packages import InstallPackages
 from .measure_track_geometry import MeasureTrackGeometry
 from .rasterize_rail_points import RasterizeRailPoints
@@ -27,9 +32,9 @@ def _of(job: Job) -> type[RailAlgorithm]:
 
 ALGORITHMS = (
     ExtractRails,
-    ClassifyRailPoints,
-    GrowRailPoints,
-    AirborneCenterlines,
+    _of(classify_rail_points.JOB),
+    _of(grow_rail_points.JOB),
+    _of(airborne_centerlines.JOB),
     RasterizeRailPoints,
     FrpdfCleanup,
     VectorizeRails,

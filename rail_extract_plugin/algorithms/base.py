@@ -39,7 +39,7 @@ from ..setup.dependencies import explain_missing, missing_packages
 from ..writing.destinations import PAGE, appends, check_layer_name, check_page_name, destinations
 from ..writing.layers import layer_writers
 from ..writing.reports import write_shown
-from ..writing.run import new_run
+from ..writing.run import new_run, properties_of
 from ..writing.styling import NO_PROPERTIES
 from ..writing.whole_files import write_each
 from .sentences import COMMAND_LINE, sentence_for
@@ -254,7 +254,6 @@ class JobAlgorithm(RailAlgorithm):
         """Open the layers and check the values."""
         values.open_sources()
         self.JOB.check(values)
-        values.follow(values)
         return values
 
     def compute(self, job: ParameterValues, values: ParameterValues, progress: Progress) -> dict[str, Any]:
@@ -262,6 +261,10 @@ class JobAlgorithm(RailAlgorithm):
         values.follow(job)
         result = self.JOB.run(values, progress)
         progress.check()
+        if result.cloud is not None:
+            cloud = values.cloud(result.cloud.name)
+            shown = result.cloud.class_codes, result.cloud.head_width_m
+            self.layer_properties = properties_of(cloud, *shown, result.frame)
         for sentence in result.sentences:
             progress.info(sentence)
         writers = layer_writers(values, result.layers, result.frame)

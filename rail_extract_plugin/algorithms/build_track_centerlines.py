@@ -6,10 +6,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from ...core.jobs.build_track_centerlines import JOB
+from ...core.jobs.shared import figures_of
 from ...core.progress import Progress
 from ...core.standards import Gauge, RailStandard
 from ..dialog.parameter_values import ParameterValues
-from ..writing.layers import figures_of, write_layer
+from ..writing.layers import write_layer
 from .base import RailAlgorithm
 
 READING = 0.1

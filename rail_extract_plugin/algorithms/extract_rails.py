@@ -8,14 +8,16 @@ from typing import TYPE_CHECKING, Any
 
 from ...core.errors import ParameterError
 from ...core.frpdf.models import choose as choose_model
+from ...core.jobs.clouds import CloudSource, checked_crs, request_points
 from ...core.jobs.extract_rails import JOB
+from ...core.jobs.shared import figures_of
 from ...core.parameters import LEARNED
 from ...core.progress import Estimating, Progress
 from ...core.standards import DEFAULT, SEARCHED_CLASSES, Gauge, RailStandard
 from ..dialog.parameter_values import ParameterValues
-from ..reading.clouds import CloudSource, checked_crs, points_folder, request_points
+from ..reading.clouds import points_folder
 from ..systems import system
-from ..writing.layers import figures_of, figures_of_stations, layer_writers, write_raster
+from ..writing.layers import figures_of_stations, layer_writers, write_raster
 from ..writing.reports import write_report
 from ..writing.run import properties_of
 from ..writing.whole_files import write_each
@@ -76,7 +78,7 @@ class ExtractRails(RailAlgorithm):
             values.other_gauges(standard),
             values.command,
             weights,
-            values.seeds(cloud) if grow else (),
+            tuple(values.seeds(checked_crs(cloud))) if grow else (),
             self._axes(cloud, values),
         )
 
@@ -149,6 +151,6 @@ class ExtractRails(RailAlgorithm):
         if not any(raster.tiles for raster in network.cleaned):
             return {}
         rasters, frame = on_one_grid(network.cleaned, network.frame)
-        extent, model = values.extent(system(network.frame.crs_wkt)), values.choice("MODEL")
+        extent, model = values.extent(network.frame.crs_wkt), values.choice("MODEL")
         header = header_for(rasters, network.cleaned_classes, frame, job.standard, extent, model)
         return write_raster(values, "CLEANED", header, rasters)

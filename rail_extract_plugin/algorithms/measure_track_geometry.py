@@ -7,12 +7,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ...core.jobs.clouds import CloudSource
 from ...core.jobs.measure_track_geometry import JOB
 from ...core.parameters import Parameters
 from ...core.progress import Progress, Recording
 from ...core.standards import CUSTOM, Gauge, RailStandard, resolve
 from ..dialog.parameter_values import ParameterValues
-from ..reading.clouds import CloudSource, points_folder
+from ..reading.clouds import points_folder
 from ..writing.layers import figures_of_stations, layer_writers
 from ..writing.reports import write_report
 from ..writing.run import properties_of

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from ...core.frpdf.models import choose as choose_model
+from ...core.jobs.clouds import CloudSource
 from ...core.jobs.rasterize_rail_points import JOB
 from ...core.progress import Progress
 from ...core.standards import RailStandard
 from ..dialog.parameter_values import ParameterValues
-from ..reading.clouds import CloudSource, read_points
-from ..systems import system
+from ..reading.clouds import read_points
 from ..writing.layers import write_raster
 from .base import RailAlgorithm
 
@@ -53,6 +53,6 @@ class RasterizeRailPoints(RailAlgorithm):
         cell_m = cell_size(job.standard.gauge_m, job.standard.head_width_m)
         rasters = [rasterize(points.xyz, cell_m) for points in clouds]
         frame, codes = clouds[0].frame, [points.class_code for points in clouds]
-        extent = values.extent(system(frame.crs_wkt))
+        extent = values.extent(frame.crs_wkt)
         header = header_for(rasters, codes, frame, job.standard, extent)
         return write_raster(values, "OUTPUT", header, rasters, progress.span(READING, 1))

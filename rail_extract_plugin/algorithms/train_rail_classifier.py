@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...core.disk import Destination
+from ...core.jobs.clouds import CloudSource, request_points
 from ...core.jobs.train_rail_classifier import JOB
 from ...core.progress import Estimating, Progress
 from ...core.standards import SEARCHED_CLASSES, RailStandard
 from ..dialog.parameter_values import ParameterValues
-from ..reading.clouds import CloudSource, request_points
 from ..writing.reports import write_page
 from .base import RailAlgorithm
 

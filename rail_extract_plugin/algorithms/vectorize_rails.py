@@ -6,12 +6,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ...core.jobs.clouds import CloudSource
+from ...core.jobs.shared import figures_of
 from ...core.jobs.vectorize_rails import JOB
 from ...core.progress import Progress
 from ...core.standards import RailStandard
 from ..dialog.parameter_values import ParameterValues
-from ..reading.clouds import CloudSource
-from ..writing.layers import figures_of, write_layer
+from ..writing.layers import write_layer
 from .base import RailAlgorithm
 
 if TYPE_CHECKING:

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import Any
 
 from qgis.core import (
-    QgsCoordinateReferenceSystem,
     QgsProcessingContext,
     QgsProcessingParameterDefinition,
     QgsProcessingParameterNumber,
@@ -35,7 +34,7 @@ def check_values(definitions: Sequence[QgsProcessingParameterDefinition], values
         if isinstance(definition, QgsProcessingParameterNumber):
             values.optional_number(definition.name())
     if "EXTENT" in names:
-        values.extent(QgsCoordinateReferenceSystem())
+        values.extent(None)
     if "RAIL_CLASSES" in names:
         values.class_codes()
     if "ENGINE" in names:

@@ -23,10 +23,11 @@ from qgis.core import (
 from ...core.disk import Destination
 from ...core.errors import ParameterError, RailExtractError, RasterError
 from ...core.jobs import declaration as kinds
+from ...core.jobs.clouds import Bounds, CloudSource, checked_crs
 from ...core.jobs.declaration import Job
 from ...core.jobs.shared import DECREASING
 from ...core.jobs.values import Rows, Values
-from ..reading.clouds import CloudSource, checked_crs, cloud_source
+from ..reading.clouds import cloud_source, points_folder
 from ..setup.interpreter import known_interpreter
 from ..systems import prepare_system, system
 from .passwords import masked
@@ -73,7 +74,7 @@ class ParameterValues(Values):
     ) -> None:
         self.algorithm, self.parameters, self.context = algorithm, parameters, context
         self.job: Job = algorithm.JOB
-        self.sources: dict[str, QgsProcessingFeatureSource] = {}
+        self._opened: dict[str, Any] = {}
         self._command = ""
 
     def __getitem__(self, name: str) -> Any:
@@ -92,10 +93,10 @@ class ParameterValues(Values):
 
     def follow(self, prepared: ParameterValues) -> None:
         """Take over what was read in the main thread."""
-        self.sources, self._command = prepared.sources, prepared.command
+        self._opened, self._command = prepared._opened, prepared.command
 
     def open_sources(self) -> None:
-        """Open the layers, in the main thread.
+        """Find the clouds and open the layers, in the main thread.
 
         Raises
         ------
@@ -103,13 +104,15 @@ class ParameterValues(Values):
             One can't be read, has no lines where lines are needed, or has them in degrees.
         """
         for one in self.job.parameters:
-            if isinstance(one, kinds.LayerInput) and self.filled(one.name):
+            if isinstance(one, kinds.Cloud) and self.filled(one.name):
+                self.cloud(one.name)
+            elif isinstance(one, kinds.LayerInput) and not one.transformed and self.filled(one.name):
                 read = self.lines if one.kinds == (kinds.LINE,) else self.table
-                self.sources[one.name] = read(one.name)
+                self._opened[one.name] = read(one.name)
 
     def title(self, name: str) -> str:
         """Return the name of the layer that was given for an input, to show to users; empty without one."""
-        return self.sources[name].sourceName() if name in self.sources else ""
+        return self._opened[name].sourceName() if name in self._opened else ""
 
     def prepare(self, crs_wkt: str | None) -> None:
         """Build the coordinate system of the results in this thread, which is the main one."""
@@ -127,32 +130,32 @@ class ParameterValues(Values):
         """Return the coordinate system of a layer as WKT; None if it has none."""
         from ..reading.line_layers import wkt_of
 
-        return wkt_of(self.sources[name].sourceCrs()) or None
+        return wkt_of(self._opened[name].sourceCrs()) or None
 
     def rows(self, name: str, progress: Progress) -> Rows:
         """Read the fields of a layer."""
         from ..reading.line_layers import rows_of
 
-        return rows_of(self.sources[name], progress)
+        return rows_of(self._opened[name], progress)
 
     def tracks(self, name: str, progress: Progress) -> tuple[list[tuple[int, np.ndarray]], LocalFrame]:
         """Read the number and the vertices, (n, 3) local metres, of each line, and their frame."""
         from ..reading.line_layers import read_centerlines
 
-        lines, frame = read_centerlines(self.sources[name], progress, name)
+        lines, frame = read_centerlines(self._opened[name], progress, name)
         return [(line.track_id, line.xyz) for line in lines], frame
 
     def rails(self, name: str, progress: Progress) -> tuple[Sequence[RailLine], LocalFrame]:
         """Read rails, in local metres of the frame that is returned as well."""
         from ..reading.line_layers import read_rails
 
-        return read_rails(self.sources[name], progress, name)
+        return read_rails(self._opened[name], progress, name)
 
     def surveyed(self, name: str, progress: Progress) -> tuple[Sequence[SurveyedLine], LocalFrame]:
         """Read lines with their standard errors, in local metres of the frame that is returned as well."""
         from ..reading.line_layers import read_surveyed
 
-        return read_surveyed(self.sources[name], progress, name)
+        return read_surveyed(self._opened[name], progress, name)
 
     def number(self, name: str) -> float:
         """Read a number.
@@ -239,36 +242,6 @@ class ParameterValues(Values):
         prepare_system(wkt_of(source.sourceCrs()))
         return source
 
-    def guide(self, cloud: CloudSource) -> tuple[np.ndarray, ...]:
-        """Read the lines of GUIDE, in the coordinate system of the cloud; none if it is empty.
-
-        Raises
-        ------
-        RailExtractError
-            The layer has no lines, or they can't be transformed; or ONLY_GUIDED is set without GUIDE.
-        """
-        from ..reading.line_layers import read_guide
-
-        if not self.filled("GUIDE"):
-            if self.flag("ONLY_GUIDED"):
-                raise ParameterError("ONLY_GUIDED needs lines to compare tracks with: choose GUIDE.")
-            return ()
-        return read_guide(self._line_source("GUIDE"), system(checked_crs(cloud)), self.context)
-
-    def tracks_meant(self, cloud: CloudSource) -> tuple[Guide, ...]:
-        """Read the lines of GUIDE with what the layer states of them; none if it is empty.
-
-        Raises
-        ------
-        RailExtractError
-            The layer has no lines, or they can't be transformed.
-        """
-        from ..reading.line_layers import read_tracks_meant
-
-        if not self.filled("GUIDE"):
-            return ()
-        return read_tracks_meant(self._line_source("GUIDE"), system(checked_crs(cloud)), self.context)
-
     def axes(self, crs: QgsCoordinateReferenceSystem) -> PlacedAxes:
         """Read AXIS and what states its kilometres, in a coordinate system.
 
@@ -296,31 +269,6 @@ class ParameterValues(Values):
         if source is None:
             raise RailExtractError(f"{name} is not a readable layer: choose another one.")
         return source
-
-    def seeds(self, cloud: CloudSource) -> tuple[np.ndarray, ...]:
-        """Read SEEDS and SEED, in the coordinate system of the cloud.
-
-        Raises
-        ------
-        RailExtractError
-            There are none, or they can't be transformed.
-        """
-        from ..reading.line_layers import read_place, read_seeds
-
-        if not self.filled("SEEDS") and not self.filled("SEED"):
-            raise ParameterError("A rail is followed from seeds: choose a layer for SEEDS, or pick a point for SEED.")
-        crs = system(checked_crs(cloud))
-        found: tuple[np.ndarray, ...] = ()
-        if self.filled("SEEDS"):
-            source = self.algorithm.parameterAsSource(self.parameters, "SEEDS", self.context)
-            if source is None:
-                raise RailExtractError("SEEDS is not a readable layer: give a layer of points or lines.")
-            found = read_seeds(source, crs, self.context)
-        if self.filled("SEED"):
-            place = self.algorithm.parameterAsPoint(self.parameters, "SEED", self.context)
-            own = self.algorithm.parameterAsPointCrs(self.parameters, "SEED", self.context)
-            found = (*found, read_place(place, own, crs, self.context))
-        return found
 
     def _mask(self, cloud: CloudSource) -> Mask | None:
         """Read the polygons of MASK, in the coordinate system of the cloud.
@@ -355,13 +303,56 @@ class ParameterValues(Values):
             )
         return source
 
-    def cloud(self, name: str) -> CloudSource:
+    def cloud(self, name: str = "INPUT") -> CloudSource:
         """Return the files of a cloud; the parameter CRS, if any, applies to files that state no coordinate system."""
-        source = cloud_source(self.parameters.get(name), self.context)
-        crs = self.projected_crs()
-        source = replace(source, crs_wkt=crs.toWkt()) if crs.isValid() else source
-        prepare_system(checked_crs(source))
-        return replace(source, mask=self._mask(source), leave_out=self._left_out())
+        if name not in self._opened:
+            source = cloud_source(self.parameters.get(name), self.context)
+            crs = self.projected_crs()
+            source = replace(source, crs_wkt=crs.toWkt()) if crs.isValid() else source
+            prepare_system(checked_crs(source))
+            self._opened[name] = replace(source, mask=self._mask(source), leave_out=self._left_out())
+        return self._opened[name]
+
+    def scratch(self) -> AbstractContextManager[Path]:
+        """Provide a folder for the points of a run."""
+        return points_folder()
+
+    def lines_along(self, name: str, crs_wkt: str | None) -> Sequence[np.ndarray]:
+        """Read lines that show places along tracks, (k, 2) each, in a coordinate system."""
+        from ..reading.line_layers import read_guide
+
+        return self._once(name, lambda: read_guide(self._line_source(name), system(crs_wkt), self.context))
+
+    def guides(self, name: str, crs_wkt: str | None) -> Sequence[Guide]:
+        """Read such lines with what they state of their tracks."""
+        from ..reading.line_layers import read_tracks_meant
+
+        return self._once(name, lambda: read_tracks_meant(self._line_source(name), system(crs_wkt), self.context))
+
+    def seeds(self, crs_wkt: str | None) -> Sequence[np.ndarray]:
+        """Read SEEDS and SEED in a coordinate system: points, (1, 2), and lines, (k, 2)."""
+        return self._once("SEEDS", lambda: self._seeds(system(crs_wkt)))
+
+    def _seeds(self, crs: QgsCoordinateReferenceSystem) -> list[np.ndarray]:
+        from ..reading.line_layers import read_place, read_seeds
+
+        found: list[np.ndarray] = []
+        if self.filled("SEEDS"):
+            source = self.algorithm.parameterAsSource(self.parameters, "SEEDS", self.context)
+            if source is None:
+                raise RailExtractError("SEEDS is not a readable layer: give a layer of points or lines.")
+            found += read_seeds(source, crs, self.context)
+        if self.filled("SEED"):
+            place = self.algorithm.parameterAsPoint(self.parameters, "SEED", self.context)
+            own = self.algorithm.parameterAsPointCrs(self.parameters, "SEED", self.context)
+            found.append(read_place(place, own, crs, self.context))
+        return found
+
+    def _once(self, name: str, read: Callable[[], Any]) -> Any:
+        """Return what was read in the main thread."""
+        if name not in self._opened:
+            self._opened[name] = read()
+        return self._opened[name]
 
     def projected_crs(self) -> QgsCoordinateReferenceSystem:
         """Return the coordinate system CRS, an invalid one if it is empty.
@@ -380,8 +371,8 @@ class ParameterValues(Values):
             )
         return crs
 
-    def extent(self, crs: QgsCoordinateReferenceSystem) -> tuple[float, float, float, float] | None:
-        """Read EXTENT in `crs`: west, south, east and north limits.
+    def extent(self, crs_wkt: str | None) -> Bounds | None:
+        """Read EXTENT in a coordinate system: west, south, east and north limits.
 
         Raises
         ------
@@ -390,7 +381,7 @@ class ParameterValues(Values):
         """
         if not self.filled("EXTENT"):
             return None
-        extent = self.algorithm.parameterAsExtent(self.parameters, "EXTENT", self.context, crs)
+        extent = self.algorithm.parameterAsExtent(self.parameters, "EXTENT", self.context, system(crs_wkt))
         if extent.isEmpty() or not extent.isFinite():
             raise ParameterError(
                 "EXTENT has no area, or an infinite one: give a rectangle as xmin,xmax,ymin,ymax, or leave it empty."

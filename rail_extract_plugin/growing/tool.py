@@ -31,6 +31,7 @@ from qgis.PyQt.QtGui import QColor, QIcon
 from qgis.PyQt.QtWidgets import QAction, QComboBox, QFileDialog, QWidget
 
 from ...core.errors import RailExtractError
+from ...core.jobs.clouds import checked_crs
 from ...core.jobs.grow_rail_points import JOB
 from ...core.standards import DEFAULT, STANDARDS
 from ..dialog.cloud_parameter import file_filter
@@ -38,7 +39,7 @@ from ..dialog.standard_setting import LAST
 from ..dialog.wheel import ignore_wheel
 from ..notices import notices
 from ..paths import ICONS
-from ..reading.clouds import checked_crs, cloud_source
+from ..reading.clouds import cloud_source
 from ..setup.dependencies import explain_missing, missing_packages
 from ..systems import system
 from .task import GrowTask, Shown

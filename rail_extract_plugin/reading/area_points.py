@@ -7,14 +7,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
-from qgis.core import QgsCoordinateReferenceSystem
-
 from ...core.clouds.points import RailPoints
 from ...core.errors import NoRailPointsError
 from ...core.frame import LocalFrame
+from ...core.jobs.clouds import Bounds, BoundsIn, CloudSource, crs_of
 from ...core.jobs.reading import check_same_plane
 from ...core.progress import Progress
-from .clouds import Bounds, BoundsIn, CloudSource, crs_of, read_points, spool_points
+from .clouds import read_points, spool_points
 
 if TYPE_CHECKING:
     from ...core.squares.spool import SpooledPoints
@@ -88,7 +87,7 @@ def _all_of(
     """Read points with `read`, and check that there are some of each class."""
     check_same_plane("POINTS", crs_of(cloud), f"the {area.what}", area.frame)
 
-    def bounds(crs: QgsCoordinateReferenceSystem) -> Bounds:
+    def bounds(_: str | None) -> Bounds:
         return area.bounds
 
     source = replace(cloud, crs_wkt=cloud.crs_wkt or area.frame.crs_wkt)

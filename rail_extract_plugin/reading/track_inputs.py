@@ -11,13 +11,13 @@ from qgis.core import QgsProcessingFeatureSource
 
 from ...core.errors import RailExtractError
 from ...core.frame import LocalFrame
+from ...core.jobs.clouds import Bounds, CloudSource
 from ...core.jobs.reading import way
 from ...core.progress import Progress
 from ...core.rails import Centerline, RailLine, TrackGeometry
 from ...core.squares.spool import SpooledPoints
 from ...core.standards import RAIL_CLASS
 from .area_points import Area, spool_points_in
-from .clouds import Bounds, CloudSource
 from .line_layers import read_centerlines, read_rails
 
 MARGIN_M = 1.0

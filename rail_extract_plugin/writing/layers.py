@@ -26,7 +26,7 @@ from qgis.core import (
 
 from ...core.disk import Destination
 from ...core.errors import RailExtractError
-from ...core.fields import BRIDGED, LENGTH, PLACES, SIGMA, UNKNOWN_IN_METRES, Field, Product
+from ...core.fields import BRIDGED, PLACES, SIGMA, UNKNOWN_IN_METRES, Field, Product
 from ...core.progress import SILENT, Progress
 from ..compat import INTEGER, REAL, TEXT, field
 from ..dialog.parameter_values import ParameterValues
@@ -38,11 +38,10 @@ from .whole_files import write_whole
 if TYPE_CHECKING:
     import numpy as np
 
-    from ...core.airborne.survey import AirborneLine
     from ...core.frame import LocalFrame
     from ...core.output.layers import Layer
     from ...core.output.raster_file import RasterHeader
-    from ...core.rails import Centerline, RailLine, TrackGeometry
+    from ...core.rails import TrackGeometry
     from ...core.raster import RailRaster
 
 KINDS = {int: INTEGER, float: REAL, str: TEXT}
@@ -200,11 +199,6 @@ def write_raster(
         write_rasters(new, header, rasters, progress)
     _style(values, name, path, "raster")
     return {name: path}
-
-
-def figures_of(lines: Sequence[RailLine | Centerline] | Sequence[AirborneLine], what: str) -> dict[str, Any]:
-    """Return the number and length of lines as outputs: RAIL_COUNT and RAIL_LENGTH if `what` is RAIL."""
-    return {f"{what}_COUNT": len(lines), f"{what}_LENGTH": LENGTH.value(sum(line.length_m for line in lines))}
 
 
 def figures_of_stations(tracks: Sequence[TrackGeometry]) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from rail_extract.core.errors import ParameterError
 from rail_extract.core.jobs import CALLS, JOBS
 from rail_extract.core.jobs.declaration import Choice, Number
 
-REQUIRED = {name: [one.name for one in job.parameters if one.is_input] for name, job in CALLS.items()}
+REQUIRED = {name: [one.name for one in job.parameters if one.required] for name, job in CALLS.items()}
 
 
 @pytest.mark.parametrize("job", JOBS, ids=lambda job: job.name)
@@ -30,9 +30,8 @@ def test_function_and_command_take_what_the_toolbox_takes(name):
     names = [one.name for one in (*job.parameters, *job.outputs)]
     taken = inspect.signature(getattr(rx, name)).parameters
     assert sorted(taken) == sorted([*(one.lower() for one in names), "progress"])
-    assert {one: taken[one.lower()].default for one in names if one not in REQUIRED[name]} == {
-        one.name: one.default for one in (*job.parameters, *job.outputs) if not one.is_input
-    }
+    for one in (*job.parameters, *job.outputs):
+        assert taken[one.name.lower()].default == (inspect.Parameter.empty if one.required else one.default)
     outputs = [word for one in job.outputs if not one.optional for word in (f"--{one.name.lower()}", "out")]
     args = parse([name.replace("_", "-"), *REQUIRED[name], *outputs])
     assert set(names) <= set(vars(args))
@@ -67,8 +66,10 @@ def test_a_value_is_refused_in_one_sentence_that_names_it_as_its_door_does(
 
 
 def test_an_output_that_must_be_written_is_asked_for():
-    with pytest.raises(ParameterError, match="output can't be empty: give the name of a file."):
+    with pytest.raises(TypeError, match="missing a required argument: 'output'"):
         rx.export_alignment("elements.gpkg")
+    with pytest.raises(ParameterError, match="output can't be empty: give the name of a file."):
+        rx.export_alignment("elements.gpkg", None)
 
 
 def test_an_unknown_argument_is_refused():
