@@ -19,10 +19,6 @@ COMMANDS = {
     "extract": ("core.commands.extract.extract", "extract rails and track centerlines on several cores or computers"),
     **{name.replace("_", "-"): (f"{JOB}.{name}", job.summary) for name, job in CALLS.items()},
     "stations": ("core.commands.lines.stations", "give features their kilometre along an axis"),
-    "train-classifier": (
-        "core.commands.points.train_classifier",
-        "train a classifier of rail points on labelled clouds",
-    ),
     "onnx": ("core.frpdf.onnx.add_arguments", "write the network for other runtimes"),
     "train": ("laboratory.training.train.add_arguments", "train the network on synthetic rasters"),
     "evaluate": ("laboratory.training.evaluate.add_arguments", "compare weights on a fixed set of synthetic rasters"),

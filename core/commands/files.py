@@ -64,6 +64,7 @@ class FileValues(Values):
     def __init__(self, job: Job, given: Mapping[str, Any], command: str, keeps: bool = False) -> None:
         self.job, self._command, self._keeps, self._features = job, command, keeps, dict[str, "Features"]()
         self._values = {one.name: read_value(one, given.get(one.name)) for one in job.parameters}
+        self._filled = {name for name, one in given.items() if not (one is None or (isinstance(one, str) and not one))}
         named = {one.name: given.get(one.name) for one in job.outputs}
         self.destinations = destinations_of(job, {name: Path(file) for name, file in named.items() if file is not None})
 
@@ -77,8 +78,8 @@ class FileValues(Values):
         return self._command
 
     def filled(self, name: str) -> bool:
-        """Return whether a value was given."""
-        return self._values[name] not in (None, "", ())
+        """Return whether a value was given; a default does not count."""
+        return name in self._filled
 
     def wanted(self, name: str) -> bool:
         """Return whether an output is to be written."""
@@ -355,6 +356,7 @@ def destinations_of(job: Job, files: Mapping[str, Path]) -> dict[str, Destinatio
             path.parent.mkdir(parents=True, exist_ok=True)
         destination = Destination.at(path)
         if destination.file in shared and path.suffix.lower() != ".gpkg":
-            raise ParameterError(f"Only a GeoPackage holds several outputs: give {one.name} a file other than {path}.")
+            other = next(name for name in found if found[name].file == destination.file)
+            raise ParameterError(f"{other} and {one.name} are the same file: give each its own name.")
         found[one.name] = shared.setdefault(destination.file, destination)
     return found

@@ -49,7 +49,8 @@ def _check(values: Values) -> None:
 
 def _class_codes(values: Values) -> tuple[int, ...]:
     """Return the classes to use; all but noise if none is named."""
-    return class_numbers(values["CLASSES"], "CLASSES") if values.filled("CLASSES") else SEARCHED_CLASSES
+    classes = (values["CLASSES"] or "").strip()
+    return class_numbers(classes, "CLASSES") if classes else SEARCHED_CLASSES
 
 
 def _run(values: Values, progress: Progress) -> Result:

@@ -3,13 +3,68 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from ..parameters import DEFAULT_EPOCHS
+from ..progress import Estimating, Until
+from ..standards import SEARCHED_CLASSES
 from . import shared
 from .declaration import CLOUD_NEEDS, CLOUD_WORDS, RAIL_WORDS, RAW_CLOUDS, Figure, FileInput, FileOutput, Job, Number
 
+if TYPE_CHECKING:
+    from ..labelling.training import Plan
+    from ..progress import Progress
+    from .result import Result
+    from .values import Values
+
 MAX_EPOCHS, MAX_SEED = 10_000, 2**31 - 1
 """Weeks on any computer, and the largest seed of a random generator."""
+
+
+def _plan(values: Values) -> Plan:
+    """Return what the training is given, besides the cloud."""
+    from ..labelling.training import Plan
+
+    return Plan(values.class_codes(), values["EPOCHS"], values["SEED"], values["DEVICE"], values["START"])
+
+
+def _check(values: Values) -> None:
+    """Check the plan, the weights and the rail."""
+    from ..labelling.training import check_training
+
+    check_training(values.path("WEIGHTS"), _plan(values))
+    values.standard()
+
+
+def _run(values: Values, progress: Progress) -> Result:
+    """Train and write the weights."""
+    from ..classify.settings import Settings
+    from ..labelling.training import train_classifier
+    from ..report.training_card import build_card, facts_of
+    from .result import Result
+
+    if values["MINUTES"] is not None:
+        progress = Until(progress, 60 * values["MINUTES"])
+    progress, standard, plan = Estimating(progress), values.standard(), _plan(values)
+    request = values.request(SEARCHED_CLASSES, progress)
+    settings = Settings((standard.gauge_m,), standard.head_width_m)
+    weights = values.destination("WEIGHTS")
+    trained = train_classifier(request, settings, plan, weights, progress)
+    names, total = [header.path.name for header in request.headers], trained.total
+    return Result(
+        {
+            "WEIGHTS": str(weights.path),
+            "RECALL": total.recall,
+            "PRECISION": total.precision,
+            "STEPS": trained.steps,
+        },
+        request.zero,
+        pages={"CARD": lambda: build_card(trained, names, facts_of(trained, plan, standard))},
+        sentences=(
+            f"recall {total.recall:.3f}, precision {total.precision:.3f}, F1 {total.f1:.3f} of blocks kept back",
+        ),
+    )
+
 
 JOB = Job(
     "trainrailclassifier",
@@ -56,6 +111,13 @@ JOB = Job(
             high=MAX_SEED,
             whole=True,
         ),
+        Number(
+            "MINUTES",
+            "Longest time [min]",
+            "The training is cancelled after this time and keeps what it has learned. Leave empty for no limit.",
+            advanced=True,
+            optional=True,
+        ),
         replace(
             shared.DEVICE,
             label="Device of the training",
@@ -85,4 +147,7 @@ JOB = Job(
     ),
     RAW_CLOUDS,
     picture="gauge.svg",
+    call="train_classifier",
+    check=_check,
+    run=_run,
 )

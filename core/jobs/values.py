@@ -90,7 +90,7 @@ class Values(ABC):
 
     @abstractmethod
     def filled(self, name: str) -> bool:
-        """Return whether a value was given."""
+        """Return whether a value was given; a default does not count."""
 
     @abstractmethod
     def wanted(self, name: str) -> bool:

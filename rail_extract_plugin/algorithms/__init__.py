@@ -10,6 +10,7 @@ from ...core.jobs import (
     fit_alignment,
     grow_rail_points,
     import_alignment,
+    train_rail_classifier,
 )
 from ...core.jobs.declaration import Job
 from .base import JobAlgorithm, RailAlgorithm
@@ -21,7 +22,6 @@ from .install_packages import InstallPackages
 from .measure_track_geometry import MeasureTrackGeometry
 from .rasterize_rail_points import RasterizeRailPoints
 from .station_along_axis import StationAlongAxis
-from .train_rail_classifier import TrainRailClassifier
 from .vectorize_rails import VectorizeRails
 
 
@@ -45,7 +45,7 @@ ALGORITHMS = (
     _of(compare_tracks.JOB),
     _of(export_alignment.JOB),
     _of(import_alignment.JOB),
-    TrainRailClassifier,
+    _of(train_rail_classifier.JOB),
     InstallPackages,
     CheckInstallation,
 )

@@ -268,7 +268,7 @@ class JobAlgorithm(RailAlgorithm):
         for sentence in result.sentences:
             progress.info(sentence)
         writers = layer_writers(values, result.layers, result.frame)
-        writers.update({name: partial(write_shown, values, make) for name, make in result.pages.items()})
+        writers.update({name: partial(write_shown, values, make, name) for name, make in result.pages.items()})
         return {**write_each(writers, values), **result.figures}
 
 

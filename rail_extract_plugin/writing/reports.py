@@ -16,19 +16,25 @@ if TYPE_CHECKING:
     from ...core.report import Origin
 
 
+REPORT = "REPORT"
+"""Name of the page that a run shows."""
+
+
 def write_report(values: ParameterValues, network: RailNetwork, origin: Origin) -> dict[str, str]:
     """Write the report on a network with its geometry; see `write_shown`."""
     return write_shown(values, lambda: origin.report(network))
 
 
-def write_shown(values: ParameterValues, build: Callable[[], str]) -> dict[str, str]:
-    """Write REPORT if the user wants it, and have QGIS show it; an existing file stays until it is complete.
+def write_shown(values: ParameterValues, build: Callable[[], str], name: str = REPORT) -> dict[str, str]:
+    """Write a page if the user wants it, and have QGIS show a report; an existing file stays until it is complete.
 
     Parameters
     ----------
     values : ParameterValues
     build : callable
         Returns the page.
+    name : str
+        Of the output.
 
     Returns
     -------
@@ -40,11 +46,12 @@ def write_shown(values: ParameterValues, build: Callable[[], str]) -> dict[str, 
     RailExtractError
         The file cannot be written.
     """
-    path = values.output_file("REPORT")
+    path = values.output_file(name)
     if not path:
         return {}
-    written = write_page(values, "REPORT", path, build())
-    notices.report_written.emit(path)
+    written = write_page(values, name, path, build())
+    if name == REPORT:
+        notices.report_written.emit(path)
     return written
 
 
