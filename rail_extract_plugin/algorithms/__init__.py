@@ -1,17 +1,8 @@
-"""The algorithms of the toolbox, one module each."""
+"""The algorithms of the toolbox: one for each job of the core, and those of the setup."""
 
 from __future__ import annotations
 
-from ...core.jobs import (
-    airborne_centerlines,
-    classify_rail_points,
-    compare_tracks,
-    export_alignment,
-    fit_alignment,
-    grow_rail_points,
-    import_alignment,
-    train_rail_classifier,
-)
+from ...core.jobs import JOBS
 from ...core.jobs.declaration import Job
 from .base import JobAlgorithm, RailAlgorithm
 from .build_track_centerlines import BuildTrackCenterlines
@@ -30,23 +21,19 @@ def _of(job: Job) -> type[RailAlgorithm]:
     return type(job.name, (JobAlgorithm,), {"JOB": job, "__doc__": job.summary})
 
 
-ALGORITHMS = (
-    ExtractRails,
-    _of(classify_rail_points.JOB),
-    _of(grow_rail_points.JOB),
-    _of(airborne_centerlines.JOB),
-    RasterizeRailPoints,
-    FrpdfCleanup,
-    VectorizeRails,
-    BuildTrackCenterlines,
-    MeasureTrackGeometry,
-    StationAlongAxis,
-    _of(fit_alignment.JOB),
-    _of(compare_tracks.JOB),
-    _of(export_alignment.JOB),
-    _of(import_alignment.JOB),
-    _of(train_rail_classifier.JOB),
-    InstallPackages,
-    CheckInstallation,
-)
-"""The whole extraction first, then its steps in order, then the setup."""
+OWN = {
+    algorithm.JOB.name: algorithm
+    for algorithm in (
+        ExtractRails,
+        RasterizeRailPoints,
+        FrpdfCleanup,
+        VectorizeRails,
+        BuildTrackCenterlines,
+        MeasureTrackGeometry,
+        StationAlongAxis,
+    )
+}
+"""Algorithms that only the toolbox has, by the name of their job."""
+
+ALGORITHMS = (*(OWN.get(job.name) or _of(job) for job in JOBS), InstallPackages, CheckInstallation)
+"""The jobs, then the setup."""

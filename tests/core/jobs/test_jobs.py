@@ -72,6 +72,11 @@ def test_an_output_that_must_be_written_is_asked_for():
         rx.export_alignment("elements.gpkg", None)
 
 
+def test_two_outputs_are_not_one_file_unless_it_is_a_geopackage(tmp_path):
+    with pytest.raises(ParameterError, match="elements and deviations are the same file: give each its own name."):
+        rx.fit_alignment("a.gpkg", elements=tmp_path / "a.csv", deviations=tmp_path / "a.csv")
+
+
 def test_an_unknown_argument_is_refused():
     with pytest.raises(TypeError, match="unexpected keyword argument 'reech'"):
         rx.compare("a.gpkg", "b.gpkg", reech=1.0)
