@@ -119,7 +119,7 @@ def _overview(axes: plt.Axes, world: World, judged: Judged) -> None:
     if len(judged.shown):
         _dots(axes, *_unrolled(world, true.middle[judged.shown][:, :2]), "tab:green", "to be found")
     lines = cut(_lines(world, judged))
-    if judged.found is not None and len(lines.t):
+    if judged.found is not None and len(lines.number):
         off = judged.found.back.distance > NEAR_M
         _dots(axes, *_unrolled(world, lines.middle[~off][:, :2]), "tab:blue", "lines")
         _dots(axes, *_unrolled(world, lines.middle[off][:, :2]), "magenta", "false")

@@ -259,7 +259,7 @@ def measure_again(
 
 
 def _with_strips_of(rail: RailLine, support: Support | None) -> Support | None:
-    """Let a support state the strips as the rail did before, which was measured with more of its surroundings."""
+    """Keep the strips that the rail was measured with before: more of its surroundings were seen then."""
     before = rail.support
     if before is None or before.strips is None or support is None:
         return support

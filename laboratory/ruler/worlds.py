@@ -17,11 +17,11 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ...core.clouds.points import ask
-from ...core.comparison.pieces import Pieces, cut
+from ...core.comparison.pieces import cut
 from ...core.errors import RailExtractError
 from ...core.parameters import Parameters
 from ...core.pipeline import extract_files
-from ...core.polyline import resample
+from ...core.polyline import Chords, resample
 from ...core.rails import RailNetwork
 from ...core.report import Finding, list_findings
 from ...core.report.findings import examine
@@ -184,9 +184,9 @@ def limits_of(world: World) -> Limits:
     return FROM_ABOVE if world.survey.from_above else ON_GROUND
 
 
-def to_be_found(world: World, pieces: Pieces) -> np.ndarray:
+def to_be_found(world: World, pieces: Chords) -> np.ndarray:
     """Return the pieces of the true rails that the cloud shows, (n,) bool, without `END_M` at both ends."""
-    shown = np.zeros(len(pieces.t), dtype=bool)
+    shown = np.zeros(len(pieces.middle_t), dtype=bool)
     heads = world.scene.xyz[world.heads, :2]
     if not len(heads):
         return shown
@@ -194,12 +194,12 @@ def to_be_found(world: World, pieces: Pieces) -> np.ndarray:
     least = limits_of(world).points_per_m
     for number, rail in enumerate(world.scene.shown):
         mine = pieces.number == number
-        bins = (pieces.t[mine] / BIN_M).astype(int)
+        bins = (pieces.middle_t[mine] / BIN_M).astype(int)
         dense = _per_m(rail, tree, half_m, bins.max() + 1) >= least
         seen = dense[bins]
         if seen.any():
-            first, last = pieces.t[mine][seen][[0, -1]]
-            shown[mine] = seen & (pieces.t[mine] > first + END_M) & (pieces.t[mine] < last - END_M)
+            first, last = pieces.middle_t[mine][seen][[0, -1]]
+            shown[mine] = seen & (pieces.middle_t[mine] > first + END_M) & (pieces.middle_t[mine] < last - END_M)
     return shown
 
 
@@ -261,7 +261,7 @@ class _Ruler:
         world: World,
         network: RailNetwork,
         found: Match,
-        pieces: Pieces,
+        pieces: Chords,
         shown: np.ndarray,
         lines: Sequence[np.ndarray],
     ) -> None:
@@ -345,7 +345,7 @@ class _Ruler:
         least = most = 0
         for number in range(self.found.truth_count):
             mine = self.pieces.number == number
-            t, seen = self.pieces.t[mine], self.shown[mine]
+            t, seen = self.pieces.middle_t[mine], self.shown[mine]
             least += bool(self.pieces.lengths[mine][seen].sum() > END_M)
             borders = np.flatnonzero(np.diff(t[seen]) > MAX_GAP_M)
             hidden = 0

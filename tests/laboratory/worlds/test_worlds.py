@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from rail_extract.core.comparison.pieces import cut, nearest
+from rail_extract.core.comparison.pieces import cut
 from rail_extract.laboratory.scenes.raw_world import HEAD
 from rail_extract.laboratory.worlds.railway import draw_railway
 from rail_extract.laboratory.worlds.world import make
@@ -25,7 +25,7 @@ def test_a_world_is_a_function_of_its_seed(world):
 
 def test_points_on_heads_are_around_the_truth(world):
     on_head = world.scene.xyz[world.scene.kind == HEAD]
-    feet, _ = nearest(on_head, cut(world.scene.rails))
+    feet, _ = cut(world.scene.rails).nearest(on_head)
     off = on_head - feet
     noise_m = 0.02 if world.survey.from_above else 0.008
     across = np.hypot(off[:, 0], off[:, 1])
@@ -53,7 +53,7 @@ def test_tracks_that_meet_have_rails_at_one_height():
         rails = [rail for track in railway.tracks for rail in track.rails()]
         for number, rail in enumerate(rails):
             others = cut([*rails[:number], *rails[number + 1 :]])
-            feet, _ = nearest(rail, others)
+            feet, _ = others.nearest(rail)
             off = rail - feet
             meeting = np.hypot(off[:, 0], off[:, 1]) < 0.002
             assert np.all(np.abs(off[meeting, 2]) < 0.003), seed
