@@ -438,8 +438,8 @@ def _stands_alone(
 ) -> np.ndarray:
     """Return which pieces, of (pieces,) widths, may be rails without a partner, (pieces,) bool.
 
-    They are as narrow as a head and no narrower, stand as high as a rail does that is not buried in ballast, and their bed is not
-    steeper than a track's.
+    They are as narrow as a head and no narrower, stand as high as a rail does that is not buried in ballast, and their
+    bed is not steeper than a track's.
     """
     narrow = width_m < settings.head_width_m + tolerances.wider_single_m
     narrow &= width_m >= SINGLE_WIDTH * settings.head_width_m
