@@ -33,7 +33,7 @@ from ...core.design_places import check_line, check_places, has_stray
 from ...core.errors import CrsError, MissingError, RailExtractError
 from ...core.fields import CENTERLINE_FIELDS, RAIL_FIELDS, Field
 from ...core.frame import ORIGIN_STEP, LocalFrame
-from ...core.polyline import length_along
+from ...core.polyline import Polyline
 from ...core.progress import SILENT, Progress
 from ...core.rails import NO_GAPS, SAME_SUM_M, Centerline, RailLine
 
@@ -459,7 +459,7 @@ def gaps_of(feature: QgsFeature, xyz: np.ndarray) -> np.ndarray:
     except ValueError:
         return NO_GAPS.copy()
     rise = np.diff(gaps.ravel()) if gaps.ndim == 2 and gaps.shape[1] == 2 else np.array([-1.0])
-    in_order = bool((rise >= 0).all()) and gaps[-1, 1] <= length_along(xyz[:, :2])[-1] + SAME_SUM_M
+    in_order = bool((rise >= 0).all()) and gaps[-1, 1] <= Polyline(xyz).length_m + SAME_SUM_M
     return gaps if in_order else NO_GAPS.copy()
 
 
