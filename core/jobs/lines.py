@@ -17,7 +17,7 @@ from ..design_places import has_stray
 from ..errors import CrsError, MissingError, RailExtractError
 from ..fields import CENTERLINE_FIELDS, RAIL_FIELDS, Field
 from ..frame import ORIGIN_STEP, LocalFrame
-from ..polyline import length_along
+from ..polyline import Polyline
 from ..progress import Progress
 from ..rails import NO_GAPS, SAME_SUM_M, Centerline, RailLine
 
@@ -226,5 +226,5 @@ def gaps_in(row: Row, xyz: np.ndarray) -> np.ndarray:
     except ValueError:
         return NO_GAPS.copy()
     rise = np.diff(gaps.ravel()) if gaps.ndim == 2 and gaps.shape[1] == 2 else np.array([-1.0])
-    in_order = bool((rise >= 0).all()) and gaps[-1, 1] <= length_along(xyz[:, :2])[-1] + SAME_SUM_M
+    in_order = bool((rise >= 0).all()) and gaps[-1, 1] <= Polyline(xyz).length_m + SAME_SUM_M
     return gaps if in_order else NO_GAPS.copy()
