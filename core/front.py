@@ -24,9 +24,9 @@ from .pipeline import extract_files
 from .progress import SILENT, Progress
 from .rails import RailNetwork, SearchFigures
 from .report import Origin
+from .run.processes import workers as workers_of
 from .scratch import scratch_folder
 from .standards import DEFAULT, RAIL_CLASS, SEARCHED_CLASSES, resolve
-from .workers.runner import workers as workers_of
 
 if TYPE_CHECKING:
     import geopandas

@@ -27,6 +27,8 @@ from .parameters import ALIGNED, Parameters
 from .progress import SILENT, Progress, Recording, counted
 from .rails import Centerline, RailLine, RailNetwork, TrackGeometry
 from .raster import RailRaster
+from .run.loop import Runner
+from .run.tasks import Context, Task
 from .scratch import scratch_folder
 from .squares.density import occupied_squares, plausible, warn_of_airborne, warn_of_unexplained
 from .squares.grid import Key, MemorySource, PointSource, Square, around, assembled
@@ -34,7 +36,6 @@ from .squares.pieces import SquareRails, rows_in_frame
 from .squares.remeasuring import measure_rails
 from .squares.spool import SpooledFile, SpooledPoints, gather, spool_file
 from .squares.steps import clean_square, engine_for, rails_of_square, square_side, whole_rails
-from .tasks import Context, InTurn, Runner, Task
 from .tracks.centerlines import tracks_of
 from .tracks.geometry import measure_track_geometry
 from .tracks.parallels import widths_by_gauge
@@ -95,7 +96,7 @@ def extract_rails(
         raise NoRailPointsError("There is no point to extract rails from.")
     side_m = square_side(parameters)
     sources = [MemorySource(one, side_m) if isinstance(one, RailPoints) else one for one in points]
-    return _walk(sources, parameters, InTurn(), progress)
+    return _walk(sources, parameters, Runner(), progress)
 
 
 def extract_files(

@@ -13,8 +13,8 @@ from ..errors import NoRailPointsError, ParameterError
 from ..frame import LocalFrame
 from ..parameters import AirborneParameters
 from ..progress import Progress
+from ..run.tasks import Context, Task
 from ..standards import STANDARDS
-from ..tasks import Context, Task
 from .axis import Axis, axis_of_guide
 from .fitting import EMPTY, SEEN, Fitted, Stations, fit_tracks
 from .remarks import FLIGHT, are_hints, on_density, on_gauges, on_shapes, refuse_mobile

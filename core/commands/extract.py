@@ -1,4 +1,4 @@
-"""The command `python -m rail_extract extract`: the outputs of Extract Rails, from local workers or a cluster."""
+"""The command `python -m rail_extract extract`: the outputs of Extract Rails, from this computer or a cluster."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ from ..frpdf import DEVICES, ENGINES, MAX_PASSES
 from ..frpdf.models import NAMES, choose
 from ..learned.model import weights_for
 from ..output.raster_file import header_for, on_one_grid, write_rasters
-from ..parameters import DEFAULT_STEP_M, DEFAULT_WORKERS, LEARNED, MAX_WORKERS, STRIPS, Parameters
+from ..parameters import DEFAULT_STEP_M, LEARNED, STRIPS, Parameters
 from ..pipeline import extract_files
 from ..progress import Estimating, Progress, counted
 from ..rails import RailNetwork
 from ..report import Origin, summary
+from ..run.loop import Runner
 from ..scratch import scratch_folder
+from ..squares.kept import KeptResults
 from ..standards import SEARCHED_CLASSES, RailStandard, resolve
-from ..tasks import Runner
-from ..workers.runner import workers
 from .options import (
     LAYER,
     REPORT,
@@ -37,10 +37,13 @@ from .options import (
     add_method_arguments,
     add_outputs,
     add_tiles_argument,
+    add_workers_argument,
+    checked_workers,
     destinations_of,
     gauges_of,
     numbers_in,
     request_of,
+    runner_of,
     vector_module,
 )
 
@@ -136,14 +139,12 @@ def _add_workers(group: argparse._ArgumentGroup) -> None:
         "--tls-cert", type=Path, metavar="PEM", help="certificate of this computer, signed by the authority"
     )
     group.add_argument("--tls-key", type=Path, metavar="PEM", help="private key of this certificate")
-    text = "show what local workers do at http://127.0.0.1:PORT, to all users of this computer (default: nowhere)"
+    text = "compute with Dask on this computer, and show what it does at http://127.0.0.1:PORT, to all users"
     group.add_argument("--dashboard", type=int, metavar="PORT", help=text)
-    text = "local workers; 0, the default, is one per core, or fewer if memory is short"
-    group.add_argument("--workers", type=int, default=DEFAULT_WORKERS, metavar="N", help=text)
+    add_workers_argument(group)
     group.add_argument("--work", type=Path, help="folder that keeps finished results, so that a restart continues")
     group.add_argument(
         "--square-tiles",
-        "--stretch-tiles",  # the name in earlier versions, which batch files still use
         type=int,
         default=Parameters.square_tiles,
         metavar="N",
@@ -187,12 +188,11 @@ def _parameters(args: argparse.Namespace, standard: RailStandard) -> Parameters:
     choose(standard.gauge_m, standard.head_width_m, args.model)
     gauges = gauges_of(args, standard, args.centerline_tolerance)
     numbers = {field.name: getattr(args, _option(field.name)[2:].replace("-", "_")) for field in NUMBERS}
-    for name, value in {**numbers, "iterations": args.iterations, "step": args.step, "workers": args.workers}.items():
+    for name, value in {**numbers, "iterations": args.iterations, "step": args.step}.items():
         if value is not None and not (math.isfinite(value) and value >= 0) or (name in POSITIVE and value == 0):
             raise ParameterError(f"The option {_option(name)} can't be {value}: give a larger number.")
-    for name, value, largest in (("iterations", args.iterations, MAX_PASSES), ("workers", args.workers, MAX_WORKERS)):
-        if value > largest:
-            raise ParameterError(f"The option {_option(name)} can't be {value}: give {largest} or less.")
+    if args.iterations > MAX_PASSES:
+        raise ParameterError(f"The option --iterations can't be {args.iterations}: give {MAX_PASSES} or less.")
     return Parameters(
         standard.gauge_m,
         standard.head_width_m,
@@ -242,24 +242,26 @@ def _run_in(
 
 
 def _on_dask(args: argparse.Namespace) -> bool:
-    """Return whether an option asks for what only Dask can do: a cluster, and what its local workers keep and show."""
-    return bool(args.scheduler or args.workers or args.work is not None or args.dashboard is not None)
+    """Return whether an option asks for Dask: a cluster, or the page about its workers."""
+    return bool(args.scheduler) or args.dashboard is not None
 
 
 @contextmanager
 def _runner(args: argparse.Namespace, folder: Path, progress: Progress) -> Iterator[Runner]:
-    """Provide the runner: Dask if it is asked for, else processes of this computer."""
+    """Provide the runner: Dask if it is asked for, else processes of this computer.
+
+    The workers of Dask exchange files, so that it keeps results in any case.
+    """
     files = _certificate_files(args, progress)
     if not _on_dask(args):
-        with workers(DEFAULT_WORKERS) as runner:
+        with runner_of(args, KeptResults(folder) if args.work is not None else None, tolerant=True) as runner:
             yield runner
         return
-    from ..cluster.runner import DaskRunner
-    from ..cluster.workers import Certificates, connect
+    from ..run.cluster import Certificates, Cluster, running, started
 
-    certificates = Certificates(*files) if files else None
-    with connect(args.scheduler, args.workers or None, certificates, args.dashboard) as client:
-        yield DaskRunner(client, folder)
+    certificates, count = Certificates(*files) if files else None, checked_workers(args)
+    with running(args.scheduler, certificates) if args.scheduler else started(count, args.dashboard) as client:
+        yield Runner(Cluster(client), KeptResults(folder), tolerant=True)
 
 
 def _weights(args: argparse.Namespace) -> Path | None:

@@ -19,9 +19,9 @@ from ..disk import Destination, writing
 from ..errors import ParameterError
 from ..parameters import DEFAULT_WORKERS, GEOMETRY, LEARNED, LEAVE_OUT, MAX_WORKERS, METHODS, Parameters
 from ..progress import Progress
+from ..run.loop import Keeping, Runner
+from ..run.processes import workers
 from ..standards import DEFAULT, Gauge, RailStandard, read_gauges
-from ..tasks import Runner
-from ..workers.runner import workers
 
 
 def add_tiles_argument(parser: argparse.ArgumentParser) -> None:
@@ -271,8 +271,15 @@ def add_workers_argument(parser: argparse._ActionsContainer) -> None:
     parser.add_argument("--workers", type=int, default=DEFAULT_WORKERS, metavar="N", help=text)
 
 
-def runner_of(args: argparse.Namespace) -> AbstractContextManager[Runner]:
-    """Provide the runner with the workers that are asked for.
+def runner_of(
+    args: argparse.Namespace, keeping: Keeping | None = None, tolerant: bool = False
+) -> AbstractContextManager[Runner]:
+    """Provide the runner with the workers that are asked for; see `Runner`."""
+    return workers(checked_workers(args), keeping=keeping, tolerant=tolerant)
+
+
+def checked_workers(args: argparse.Namespace) -> int:
+    """Return the number of workers.
 
     Raises
     ------
@@ -281,7 +288,7 @@ def runner_of(args: argparse.Namespace) -> AbstractContextManager[Runner]:
     """
     if not 0 <= args.workers <= MAX_WORKERS:
         raise ParameterError(f"--workers must be a number from 0 to {MAX_WORKERS}, not {args.workers}.")
-    return workers(args.workers)
+    return args.workers
 
 
 class Console(Progress):

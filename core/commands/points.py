@@ -30,9 +30,9 @@ from ..output.layers import stops_layer
 from ..parameters import DEFAULT_EPOCHS, DEFAULT_GUIDE_DISTANCE_M, GrowParameters
 from ..progress import Estimating, Progress
 from ..report.training_card import build_card, facts_of
+from ..run.loop import Runner
 from ..scratch import scratch_folder
 from ..standards import LAST_CLASS, RAIL_CLASS, SEARCHED_CLASSES, resolve
-from ..tasks import InTurn
 from .options import (
     LAYER,
     WRITING,
@@ -147,7 +147,7 @@ def _grow(args: argparse.Namespace) -> None:
     choice = Choice(args.rail_class, args.rails_only, reset=False)
     seeds = _seeds(args, request.zero.crs_wkt)
     with _beside(planned) as folder:
-        result = grow_files(request, seeds, settings, choice, planned, folder, InTurn(), progress)
+        result = grow_files(request, seeds, settings, choice, planned, folder, Runner(), progress)
     if written is not None:
         written.write_layers([stops_layer(result.stops)], stops, request.zero)
     _print(result)

@@ -15,10 +15,10 @@ from ..errors import NoRailPointsError, RailExtractError
 from ..grow.settings import GrowSettings
 from ..progress import Progress
 from ..rails import SearchFigures
+from ..run.loop import Runner
 from ..scratch import scratch_folder
 from ..squares.spool import Census, SpooledFile, SpooledPoints, gather
 from ..standards import RAIL_CLASS
-from ..tasks import Runner
 from .finding import find_rail_points, report
 from .growing import grow_points
 

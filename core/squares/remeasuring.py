@@ -15,7 +15,8 @@ from ..lines.smoothing import GAP_SIGMAS
 from ..polyline import length_along, resample, runs
 from ..progress import SILENT, Progress
 from ..rails import RailLine
-from ..tasks import Context, Runner, Task
+from ..run.loop import Runner
+from ..run.tasks import Context, Task
 from ..tracks.geometry import PROFILE_SIGMA_M
 from .grid import Key, PointSource, Square, lay_out, unique_keys
 

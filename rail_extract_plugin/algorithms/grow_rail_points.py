@@ -87,7 +87,7 @@ class GrowRailPoints(RailAlgorithm):
         from ...core.labelling.files import Choice, plan_output
         from ...core.labelling.growing import grow_files
         from ...core.output.layers import stops_layer
-        from ...core.tasks import InTurn
+        from ...core.run.loop import Runner
 
         progress = Estimating(progress)
         choice = Choice(job.class_code, values.rails_only(), reset=False)
@@ -95,6 +95,6 @@ class GrowRailPoints(RailAlgorithm):
         request = request_points(job.cloud, SEARCHED_CLASSES, lambda crs: None, progress)
         settings = GrowSettings(job.standard.gauge_m, job.standard.head_width_m, job.parameters)
         with points_folder() as folder:
-            grown = grow_files(request, job.seeds, settings, choice, output, folder, InTurn(), progress)
+            grown = grow_files(request, job.seeds, settings, choice, output, folder, Runner(), progress)
         results = classified_results(grown.file, grown.point_count, grown.figures)
         return {**results, **write_layer(values, "STOPS", stops_layer(grown.stops), request.zero)}

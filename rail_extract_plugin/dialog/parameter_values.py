@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from ...core.alignment.placed_axes import PlacedAxes
     from ...core.clouds.mask import Mask
     from ...core.output.raster_file import RasterHeader
-    from ...core.tasks import Runner
+    from ...core.run.loop import Runner
 
 INCREASING, DECREASING = DIRECTIONS = ("INCREASING", "DECREASING")
 """Whether kilometres increase from the first vertex of an axis."""
@@ -128,7 +128,7 @@ class ParameterValues:
 
     def runner(self) -> AbstractContextManager[Runner]:
         """Provide the runner with as many processes as WORKERS asks for."""
-        from ...core.workers.runner import workers
+        from ...core.run.processes import workers
 
         return workers(int(self.number("WORKERS")), known_interpreter)
 

@@ -14,11 +14,11 @@ from rail_extract.core.polyline import length_along, project
 from rail_extract.core.progress import Progress
 from rail_extract.core.rails import RailLine, SearchFigures
 from rail_extract.core.raster import cell_size, rasterize
+from rail_extract.core.run.loop import Runner
 from rail_extract.core.squares import steps
 from rail_extract.core.squares.grid import MemorySource
 from rail_extract.core.squares.steps import lines_of
 from rail_extract.core.standards import STANDARDS, RailStandard
-from rail_extract.core.tasks import InTurn
 from rail_extract.core.tracks.centerlines import tracks_of
 from rail_extract.laboratory.curves import Element, trace, transition_curve
 from rail_extract.laboratory.scenes.plain import straight
@@ -250,7 +250,7 @@ def test_a_blunt_ridge_without_a_partner_is_a_rail_only_if_someone_says_so(monke
     monkeypatch.setattr(pipeline, "spool_found", found)
     monkeypatch.setattr(pipeline, "spool_grown", found)
     seeds = () if classify else (xyz[:1, :2],)
-    network = extract_files(None, tmp_path, Parameters(1.435, WIDTH), InTurn(), classify=classify, seeds=seeds)
+    network = extract_files(None, tmp_path, Parameters(1.435, WIDTH), Runner(), classify=classify, seeds=seeds)
     assert len(network.rails) == (2 if classify else 3)
     assert len(network.centerlines) == 1
 
