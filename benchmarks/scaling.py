@@ -30,6 +30,7 @@ from rail_extract.core.clouds.las import laspy
 from rail_extract.core.clouds.points import ask
 from rail_extract.core.kernels import blas, one_thread
 from rail_extract.core.pipeline import Parameters, extract_files, extract_rails
+from rail_extract.core.pipeline.sources import Classified
 from rail_extract.core.progress import SILENT, Progress
 from rail_extract.core.rails import RailLine, Support
 from rail_extract.core.run import processes
@@ -138,7 +139,7 @@ def compare_workers(tiles: Path, folder: Path) -> None:
             start = time.perf_counter()
             work = folder / f"work{workers}"
             runner = Runner(Cluster(client), KeptResults(work), tolerant=True)
-            found = extract_files(ask([tiles], [RAIL]), work, parameters(), runner)
+            found = extract_files(Classified(ask([tiles], [RAIL])), work, parameters(), runner)
             seconds.append(time.perf_counter() - start)
         print(f"{workers} worker(s) with one thread: {seconds[-1]:.1f} s, {len(found.rails)} rails")
     print(f"Two workers are {seconds[0] / seconds[1]:.2f} times as fast as one")
@@ -212,7 +213,7 @@ def processor_seconds(tiles: Path, runners: AbstractContextManager[Runner]) -> t
     before, start = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
     own = time.process_time()
     with tempfile.TemporaryDirectory() as work, one_thread(*blas()), runners as runner:
-        extract_files(ask([tiles], [RAIL]), Path(work), parameters(), runner)
+        extract_files(Classified(ask([tiles], [RAIL])), Path(work), parameters(), runner)
     after, own = resource.getrusage(resource.RUSAGE_CHILDREN), time.process_time() - own
     others = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
     return time.perf_counter() - start, own, others

@@ -21,6 +21,7 @@ from ..learned.model import weights_for
 from ..output.raster_file import header_for, on_one_grid, write_rasters
 from ..parameters import DEFAULT_STEP_M, LEARNED, STRIPS, Parameters
 from ..pipeline import extract_files
+from ..pipeline.sources import Classified, Grown, Raw, Source
 from ..progress import Estimating, Progress, counted
 from ..rails import RailNetwork
 from ..report import Origin, summary
@@ -228,7 +229,10 @@ def _run_in(
         wkt = request.zero.crs_wkt
         seeds = vector_module("--seeds").read_seeds(args.seeds, wkt) if args.seeds else ()
         axes = vector_module("--axis", "kilometres").read_axes(args, None, wkt)[0] if args.axis else None
-        network = extract_files(request, folder.resolve(), parameters, runner, progress, args.classify, weights, seeds)
+        source: Source = Classified(request)
+        if raw:
+            source = Raw(request, weights) if args.classify else Grown(request, seeds)
+        network = extract_files(source, folder.resolve(), parameters, runner, progress)
     if axes is not None:
         network = replace(network, geometry=axes.along(network.geometry, network.frame, progress))
     _write(network, origin, parameters.model, request.extent, outputs)

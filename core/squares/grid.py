@@ -16,6 +16,7 @@ import numpy as np
 from ..clouds.points import RailPoints
 from ..frame import LocalFrame
 from ..heads.on_heads import heads_of
+from ..rails import SearchFigures
 from ..raster import TILE, RailRaster
 
 OVERLAP_M = 40.0
@@ -108,6 +109,27 @@ class PointSource(Protocol):
 
     def part(self, square: Square) -> PointSource:
         """Return the source without the squares that are neither `square` nor its neighbours, where that is smaller."""
+
+
+@dataclass(frozen=True)
+class SortedPoints:
+    """Rail points by class and square.
+
+    Attributes
+    ----------
+    classes : sequence of PointSource
+    search : SearchFigures or None
+        What was found, if the points are from a raw cloud.
+    only_pairs : bool
+        Whether nothing but its partner tells a rail from other ridges, where heads are blunt.
+    is_warned : bool
+        Whether the user has been warned of another gauge.
+    """
+
+    classes: Sequence[PointSource]
+    search: SearchFigures | None = None
+    only_pairs: bool = False
+    is_warned: bool = False
 
 
 class MemorySource:

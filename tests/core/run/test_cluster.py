@@ -12,6 +12,7 @@ from distributed import Client, KilledWorker, LocalCluster
 from rail_extract.core.clouds.points import ask, read_rail_points
 from rail_extract.core.errors import DiskError
 from rail_extract.core.pipeline import Parameters, extract_files, extract_rails
+from rail_extract.core.pipeline.sources import Classified
 from rail_extract.core.progress import SILENT, Progress
 from rail_extract.core.rails import RailLine
 from rail_extract.core.run.cluster import Cluster, execute
@@ -51,7 +52,9 @@ def executor(request):
 def extract(executor, paths, folder, progress=SILENT):
     """Extract as the command does."""
     runner = Runner(executor, KeptResults(folder), tolerant=True)
-    return extract_files(ask(paths, [RAIL], unreadable=runner.failures), folder, PARAMETERS, runner, progress)
+    return extract_files(
+        Classified(ask(paths, [RAIL], unreadable=runner.failures)), folder, PARAMETERS, runner, progress
+    )
 
 
 def same(found, expected, frame, other):

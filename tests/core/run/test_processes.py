@@ -15,6 +15,7 @@ from rail_extract.core.clouds.points import ask
 from rail_extract.core.errors import Cancelled, RailExtractError
 from rail_extract.core.kernels import blas, one_thread
 from rail_extract.core.pipeline import Parameters, extract_files
+from rail_extract.core.pipeline.sources import Classified
 from rail_extract.core.progress import Progress
 from rail_extract.core.run import processes as module
 from rail_extract.core.run.loop import Runner
@@ -367,7 +368,7 @@ def test_lines_are_the_same_to_the_last_bit(functions, tiles, tmp_path, differen
         folder = tmp_path / str(count)
         folder.mkdir()
         with one_thread(*blas()), workers(count) as runner:
-            found.append(extract_files(ask([tiles], [10]), folder, parameters, runner))
+            found.append(extract_files(Classified(ask([tiles], [10])), folder, parameters, runner))
     assert len(found[0].rails) > 1
     for other in found[1:]:
         for name in vars(found[0]):
