@@ -6,7 +6,7 @@ It divides the work into tasks for a runner, which executes them one after anoth
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -131,7 +131,7 @@ def _walk(points: SortedPoints, parameters: Parameters, runner: Runner, progress
     progress = Recording(progress)
     drawing, pairing, measuring = progress.divide((DRAWING, PAIRING, MEASURING))
     points = replace(points, classes=plausible(points.classes, progress))
-    network, strips = _drawn(points, parameters, runner, drawing)
+    network, strips, points = _drawn(points, parameters, runner, drawing)
     network = _paired(network, points, parameters, runner, pairing)
     network, beyond_m = checks.of(network, points, parameters, progress)
     network = _measured(network, beyond_m, points, parameters, runner, measuring)
@@ -148,17 +148,23 @@ def _walk(points: SortedPoints, parameters: Parameters, runner: Runner, progress
 
 def _drawn(
     points: SortedPoints, parameters: Parameters, runner: Runner, progress: Progress
-) -> tuple[RailNetwork, np.ndarray]:
-    """Draw the rails of all classes; returns the rows of `pieces.rows_in_frame` that show strips, (k, 7), as well."""
+) -> tuple[RailNetwork, np.ndarray, SortedPoints]:
+    """Draw the rails of all classes.
+
+    Also returns the rows of `pieces.rows_in_frame` that show strips, (k, 7), and points that know how blunt they are.
+    """
     progress.status("Drawing the rails")
     rails: list[RailLine] = []
     strips: list[np.ndarray] = []
     cleaned: dict[int, RailRaster] = {}
+    judged: list[PointSource] = []
     any_square = False
     for source, share in zip(points.classes, progress.split(len(points.classes))):
         squares = {square.key: square for square in occupied_squares(points.classes, source)}
         _announce_squares(source, squares, parameters, share)
         parts, rasters = _draw_squares(source, squares, parameters, runner, share)
+        parts, source = _drawn_alike(parts, source, squares, parameters, runner, share)
+        judged.append(source)
         any_square |= bool(parts) or not squares
         strips += [rows_in_frame(part, source.frame) for part in parts]
         found = whole_rails(_released(parts), source.frame, parameters, len(rails) + 1, share) if parts else []
@@ -170,7 +176,7 @@ def _drawn(
         raise RailExtractError(f"Not one square could be extracted; the last error was: {runner.failures[-1]}")
     frame = points.classes[0].frame
     network = RailNetwork(tuple(rails), (), frame, cleaned=tuple(cleaned.values()), cleaned_classes=tuple(cleaned))
-    return network, np.concatenate(strips or [rows_of((), ())])
+    return network, np.concatenate(strips or [rows_of((), ())]), replace(points, classes=judged)
 
 
 def _paired(
@@ -210,9 +216,16 @@ def _lengths(lines: Sequence[RailLine] | Sequence[Centerline], what: str) -> str
 
 
 def _draw_squares(
-    source: PointSource, squares: Mapping[Key, Square], parameters: Parameters, runner: Runner, progress: Progress
+    source: PointSource,
+    squares: Mapping[Key, Square],
+    parameters: Parameters,
+    runner: Runner,
+    progress: Progress,
+    drawn: Collection[Key] | None = None,
 ) -> tuple[list[SquareRails], dict[Key, RailRaster]]:
     """Clean the raster of every square of a class, and draw the lines of each square once its neighbours are clean.
+
+    Given `drawn`, only the lines of these squares are drawn.
 
     Returns
     -------
@@ -222,7 +235,7 @@ def _draw_squares(
     """
     parts: list[SquareRails] = []
     rasters: dict[Key, RailRaster] = {}
-    for (step, key), result in runner.run(dict(_square_tasks(source, squares, parameters)), progress):
+    for (step, key), result in runner.run(dict(_square_tasks(source, squares, parameters, drawn or squares)), progress):
         if step is _draw:
             parts.append(result)
         else:
@@ -230,10 +243,35 @@ def _draw_squares(
     return parts, rasters
 
 
+def _drawn_alike(
+    parts: list[SquareRails],
+    source: PointSource,
+    squares: Mapping[Key, Square],
+    parameters: Parameters,
+    runner: Runner,
+    progress: Progress,
+) -> tuple[list[SquareRails], PointSource]:
+    """Draw the squares again that took the cloud for blunt while the most length shows that it is sharp, or vice versa.
+
+    Also returns the source of points that know it.
+    """
+    shown_m = np.zeros(2)
+    for part in parts:
+        shown_m[int(bool(part.blunt))] += sum(rail.length_m for rail in part.rails)
+    source = source.judged(bool(shown_m[1] > shown_m[0]))
+    odd = {part.square.key for part in parts if part.blunt not in (None, shown_m[1] > shown_m[0])}
+    if odd:
+        near = {key: square for key, square in squares.items() if odd.intersection(around(key))}
+        settings = replace(parameters, keep_cleaned=False)
+        again, _ = _draw_squares(source, near, settings, runner, progress.span(1.0, 1.0), odd)
+        parts = [part for part in parts if part.square.key not in odd] + again
+    return parts, source
+
+
 def _square_tasks(
-    source: PointSource, squares: Mapping[Key, Square], parameters: Parameters
+    source: PointSource, squares: Mapping[Key, Square], parameters: Parameters, drawn: Collection[Key]
 ) -> Iterator[tuple[tuple[Callable, Key], Task]]:
-    """Yield the tasks of all squares of a class: first those that clean, then those that draw."""
+    """Yield the tasks of squares of a class: first those that clean all, then those that draw the lines of some."""
     # These two do not change the lines: without them, a runner that keeps results finds those of earlier runs.
     settings = replace(parameters, quality_step_m=None, keep_cleaned=False)
     arguments = {key: (source.part(square), square, settings) for key, square in squares.items()}
@@ -250,7 +288,7 @@ def _square_tasks(
                 returned=parameters.keep_cleaned,
             ),
         )
-    for key in squares:
+    for key in drawn:
         neighbours = tuple((_clean, near) for near in around(key) if near in squares and near != key)
         yield (
             (_draw, key),

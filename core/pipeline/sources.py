@@ -144,4 +144,5 @@ class Grown:
 def _gathered(request: Request, side_m: float, folder: Path, census: Census, figures: SearchFigures) -> SortedPoints:
     """Return the points that were found in a raw cloud."""
     (source,) = gather(request, side_m, [SpooledFile(str(folder), census.report())])
-    return SortedPoints([replace(source, found=True)], figures)
+    blunt = True if figures.blunt_m else None  # narrow ones may have no edges either
+    return SortedPoints([replace(source, found=True, blunt=blunt)], figures)
