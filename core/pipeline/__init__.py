@@ -225,13 +225,7 @@ def _draw_squares(
 ) -> tuple[list[SquareRails], dict[Key, RailRaster]]:
     """Clean the raster of every square of a class, and draw the lines of each square once its neighbours are clean.
 
-    Given `drawn`, only the lines of these squares are drawn.
-
-    Returns
-    -------
-    parts : list of SquareRails
-    rasters : dict of Key to RailRaster
-        Cleaned rasters, if they are to be kept.
+    Given `drawn`, only the lines of these squares are drawn. Returns the lines, and cleaned rasters if they are kept.
     """
     parts: list[SquareRails] = []
     rasters: dict[Key, RailRaster] = {}

@@ -60,13 +60,7 @@ def workers(
 ) -> Iterator[Runner]:
     """Provide a runner with workers, as many as `worker_count` says, which end with the context; one is this process.
 
-    Parameters
-    ----------
-    wanted : int
-    interpreter : callable
-        Finds the Python program when the first worker is started.
-    keeping, tolerant
-        See `Runner`.
+    The Python program is looked for when the first worker is started.
     """
     count = worker_count(wanted)
     executor = InTurn() if count == 1 else Processes(count, interpreter)

@@ -65,15 +65,9 @@ Messages = SimpleQueue
 
 
 class Worker:
-    """A process that executes one task after another.
+    """A process that executes one task after another, and puts (worker, kind, content) for each message into a queue.
 
     It ends with this one, however that ends: its input ends then.
-
-    Parameters
-    ----------
-    interpreter : Interpreter
-    messages : SimpleQueue
-        Receives (worker, kind, content) for each message, from a thread of its own.
     """
 
     def __init__(self, interpreter: Interpreter, messages: Messages) -> None:
