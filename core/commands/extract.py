@@ -19,13 +19,14 @@ from ..frpdf import DEVICES, ENGINES, MAX_PASSES
 from ..frpdf.models import NAMES, choose
 from ..learned.model import weights_for
 from ..output.raster_file import header_for, on_one_grid, write_rasters
-from ..parameters import DEFAULT_STEP_M, LEARNED, STRIPS, Parameters
+from ..parameters import DEFAULT_STEP_M, DEFAULT_WORKERS, LEARNED, MAX_WORKERS, STRIPS, Parameters
 from ..pipeline import extract_files
 from ..pipeline.sources import Classified, Grown, Raw, Source
 from ..progress import Estimating, Progress, counted
 from ..rails import RailNetwork
 from ..report import Origin, summary
 from ..run.loop import Runner
+from ..run.processes import workers
 from ..scratch import scratch_folder
 from ..squares.kept import KeptResults
 from ..standards import SEARCHED_CLASSES, RailStandard, resolve
@@ -38,13 +39,10 @@ from .options import (
     add_method_arguments,
     add_outputs,
     add_tiles_argument,
-    add_workers_argument,
-    checked_workers,
     destinations_of,
     gauges_of,
     numbers_in,
     request_of,
-    runner_of,
     vector_module,
 )
 
@@ -142,7 +140,8 @@ def _add_workers(group: argparse._ArgumentGroup) -> None:
     group.add_argument("--tls-key", type=Path, metavar="PEM", help="private key of this certificate")
     text = "compute with Dask on this computer, and show what it does at http://127.0.0.1:PORT, to all users"
     group.add_argument("--dashboard", type=int, metavar="PORT", help=text)
-    add_workers_argument(group)
+    text = "processes that compute at a time; 0, the default, is one per core, as far as memory allows"
+    group.add_argument("--workers", type=int, default=DEFAULT_WORKERS, metavar="N", help=text)
     group.add_argument("--work", type=Path, help="folder that keeps finished results, so that a restart continues")
     group.add_argument(
         "--square-tiles",
@@ -189,11 +188,12 @@ def _parameters(args: argparse.Namespace, standard: RailStandard) -> Parameters:
     choose(standard.gauge_m, standard.head_width_m, args.model)
     gauges = gauges_of(args, standard, args.centerline_tolerance)
     numbers = {field.name: getattr(args, _option(field.name)[2:].replace("-", "_")) for field in NUMBERS}
-    for name, value in {**numbers, "iterations": args.iterations, "step": args.step}.items():
+    for name, value in {**numbers, "iterations": args.iterations, "step": args.step, "workers": args.workers}.items():
         if value is not None and not (math.isfinite(value) and value >= 0) or (name in POSITIVE and value == 0):
             raise ParameterError(f"The option {_option(name)} can't be {value}: give a larger number.")
-    if args.iterations > MAX_PASSES:
-        raise ParameterError(f"The option --iterations can't be {args.iterations}: give {MAX_PASSES} or less.")
+    for name, value, largest in (("iterations", args.iterations, MAX_PASSES), ("workers", args.workers, MAX_WORKERS)):
+        if value > largest:
+            raise ParameterError(f"The option {_option(name)} can't be {value}: give {largest} or less.")
     return Parameters(
         standard.gauge_m,
         standard.head_width_m,
@@ -258,13 +258,14 @@ def _runner(args: argparse.Namespace, folder: Path, progress: Progress) -> Itera
     """
     files = _certificate_files(args, progress)
     if not _on_dask(args):
-        with runner_of(args, KeptResults(folder) if args.work is not None else None, tolerant=True) as runner:
+        keeping = None if args.work is None else KeptResults(folder)
+        with workers(args.workers, keeping=keeping, tolerant=True) as runner:
             yield runner
         return
     from ..run.cluster import Certificates, Cluster, running, started
 
-    certificates, count = Certificates(*files) if files else None, checked_workers(args)
-    with running(args.scheduler, certificates) if args.scheduler else started(count, args.dashboard) as client:
+    certificates = Certificates(*files) if files else None
+    with running(args.scheduler, certificates) if args.scheduler else started(args.workers, args.dashboard) as client:
         yield Runner(Cluster(client), KeptResults(folder), tolerant=True)
 
 

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import argparse
-import math
 import signal
 import sys
-from collections.abc import Mapping, Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
@@ -17,10 +15,8 @@ from ..alignment.km_text import HECTOMETRES, NOTATIONS
 from ..clouds.points import Request, ask
 from ..disk import Destination, writing
 from ..errors import ParameterError
-from ..parameters import DEFAULT_WORKERS, GEOMETRY, LEARNED, LEAVE_OUT, MAX_WORKERS, METHODS, Parameters
+from ..parameters import GEOMETRY, LEARNED, LEAVE_OUT, METHODS, Parameters
 from ..progress import Progress
-from ..run.loop import Keeping, Runner
-from ..run.processes import workers
 from ..standards import DEFAULT, Gauge, RailStandard, read_gauges
 
 
@@ -200,40 +196,6 @@ def gauges_of(args: argparse.Namespace, standard: RailStandard, tolerance_m: flo
     return read_gauges(args.other_gauges, "--other-gauges", standard, own_m, tolerance_m is not None)
 
 
-def positive(text: str) -> float:
-    """Return a length that an option states.
-
-    Raises
-    ------
-    argparse.ArgumentTypeError
-        It is not a positive number.
-    """
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not 0 < value < math.inf:
-        raise argparse.ArgumentTypeError(f"{text} is not a positive number")
-    return value
-
-
-def add_length(parser: argparse._ActionsContainer, option: str, default: float, text: str, unit: str = "M") -> None:
-    """Declare an option that states a length."""
-    help_text = f"{text} (default: {default:g})"
-    parser.add_argument(option, type=positive, default=default, metavar=unit, help=help_text)
-
-
-def add_lengths(parser: argparse._ActionsContainer, texts: Mapping[str, str], defaults: type) -> None:
-    """Declare an option for each length, an attribute of `defaults` without its unit."""
-    for name, text in texts.items():
-        add_length(parser, f"--{name.replace('_', '-')}", getattr(defaults, f"{name}_m"), text)
-
-
-def lengths_of(args: argparse.Namespace, texts: Mapping[str, str]) -> dict[str, float]:
-    """Return the lengths of `add_lengths` as arguments of the class of the defaults."""
-    return {f"{name}_m": getattr(args, name) for name in texts}
-
-
 def numbers_in(text: str, option: str, kind: type) -> tuple:
     """Return the distinct numbers in a text such as "10,11" or "1000;1067".
 
@@ -265,41 +227,20 @@ def extent_of(text: str | None) -> tuple[float, float, float, float] | None:
     return xmin, ymin, xmax, ymax
 
 
-def add_workers_argument(parser: argparse._ActionsContainer) -> None:
-    """Declare the number of workers."""
-    text = "processes that compute at a time; 0, the default, is one per core, as far as memory allows"
-    parser.add_argument("--workers", type=int, default=DEFAULT_WORKERS, metavar="N", help=text)
-
-
-def runner_of(
-    args: argparse.Namespace, keeping: Keeping | None = None, tolerant: bool = False
-) -> AbstractContextManager[Runner]:
-    """Provide the runner with the workers that are asked for; see `Runner`."""
-    return workers(checked_workers(args), keeping=keeping, tolerant=tolerant)
-
-
-def checked_workers(args: argparse.Namespace) -> int:
-    """Return the number of workers.
-
-    Raises
-    ------
-    ParameterError
-        No computer has that many.
-    """
-    if not 0 <= args.workers <= MAX_WORKERS:
-        raise ParameterError(f"--workers must be a number from 0 to {MAX_WORKERS}, not {args.workers}.")
-    return args.workers
-
-
 class Console(Progress):
     """Prints steps, remaining time and warnings to the error output; Ctrl-C cancels it.
 
     Python drops the exception of a Ctrl-C that comes during a finalizer or some callbacks. The run then ends at its
     next check for cancellation.
+
+    Parameters
+    ----------
+    word : callable
+        Returns a message with the names of options for those of parameters.
     """
 
-    def __init__(self) -> None:
-        self._interrupted = False
+    def __init__(self, word: Callable[[str], str] = str) -> None:
+        self._interrupted, self._word = False, word
         signal.signal(signal.SIGINT, self._interrupt)
 
     def _interrupt(self, *_: object) -> None:
@@ -316,8 +257,8 @@ class Console(Progress):
 
     def info(self, text: str) -> None:
         """Print what was done."""
-        print(text, file=sys.stderr, flush=True)
+        print(self._word(text), file=sys.stderr, flush=True)
 
     def warning(self, text: str) -> None:
         """Print a warning."""
-        print(f"Warning: {text}", file=sys.stderr, flush=True)
+        print(f"Warning: {self._word(text)}", file=sys.stderr, flush=True)

@@ -201,7 +201,7 @@ def test_an_output_that_is_a_folder_is_refused_before_the_run(tiles, tmp_path, c
         (["--gauge", "300"], "gauge"),
         (["--max-gap", "-1"], "--max-gap"),
         (["--step", "0"], "--step"),
-        (["--workers", "100000"], "--workers must be a number from 0 to 1000, not 100000."),
+        (["--workers", "100000"], "--workers can't be 100000: give 1000 or less."),
         (["--iterations", "6"], "--iterations can't be 6: give 5 or less."),
         (["--smoothing-xy", "0"], "--smoothing-xy"),
         (["--rail-classes", "300"], "0 to 255"),
