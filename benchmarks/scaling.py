@@ -17,29 +17,32 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator, Mapping
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
+from queue import SimpleQueue
 from typing import Any
 
 import numpy as np
 from rail_extract.core import pipeline
 from rail_extract.core.clouds.las import laspy
 from rail_extract.core.clouds.points import ask
-from rail_extract.core.cluster.runner import DaskRunner
-from rail_extract.core.cluster.workers import connect
 from rail_extract.core.kernels import blas, one_thread
 from rail_extract.core.pipeline import Parameters, extract_files, extract_rails
+from rail_extract.core.pipeline.sources import Classified
 from rail_extract.core.progress import SILENT, Progress
 from rail_extract.core.rails import RailLine, Support
+from rail_extract.core.run import processes
+from rail_extract.core.run.cluster import Cluster, started
+from rail_extract.core.run.loop import Answer, Runner, next_of
+from rail_extract.core.run.tasks import Context, Once, Task
 from rail_extract.core.squares.grid import HALO_M, Square
+from rail_extract.core.squares.kept import KeptResults
 from rail_extract.core.squares.pieces import SquareRails, trim
 from rail_extract.core.squares.spool import SpooledPoints, spool
 from rail_extract.core.squares.steps import engine_for, square_side
 from rail_extract.core.standards import STANDARDS
-from rail_extract.core.tasks import Context, Name, Once, Results, Runner, Task, turns
-from rail_extract.core.workers import runner as processes
 from rail_extract.laboratory.curves import Element, trace
 from rail_extract.laboratory.scenes.plain import spacing
 from rail_extract.laboratory.scenes.scanner import Scanner
@@ -130,12 +133,13 @@ def compare_workers(tiles: Path, folder: Path) -> None:
     """Run one worker with one thread, then two."""
     seconds = []
     for workers in (1, 2):
-        with connect(None, workers) as client:
+        with started(workers) as client:
             client.wait_for_workers(workers)
             client.run(engine_of_worker)
             start = time.perf_counter()
-            runner = DaskRunner(client, folder / f"work{workers}")
-            found = extract_files(ask([tiles], [RAIL]), folder / f"work{workers}", parameters(), runner)
+            work = folder / f"work{workers}"
+            runner = Runner(Cluster(client), KeptResults(work), tolerant=True)
+            found = extract_files(Classified(ask([tiles], [RAIL])), work, parameters(), runner)
             seconds.append(time.perf_counter() - start)
         print(f"{workers} worker(s) with one thread: {seconds[-1]:.1f} s, {len(found.rails)} rails")
     print(f"Two workers are {seconds[0] / seconds[1]:.2f} times as fast as one")
@@ -150,7 +154,7 @@ def compare_processes(tiles: Path) -> None:
     runners = {
         "1 process": lambda: processes.workers(1),
         "2 processes": lambda: processes.workers(2),
-        "2 threads": lambda: nullcontext(Threads(2)),
+        "2 threads": lambda: nullcontext(Runner(Threads(2))),
     }
     spent = {name: processor_seconds(tiles, runner()) for name, runner in runners.items()}
     for name, (wall_s, own_s, others_s) in spent.items():
@@ -163,36 +167,45 @@ def compare_processes(tiles: Path) -> None:
 
 
 class Threads:
-    """A runner on threads of this process, to compare with processes: Python runs one of them at a time.
+    """Executes tasks on threads of this process, to compare with processes: Python runs one of them at a time.
 
     Parameters
     ----------
-    count : int
+    places : int
         Number of threads.
     """
 
-    def __init__(self, count: int) -> None:
-        self.failures: list[str] = []
-        self._idle = [Once() for _ in range(count)]
+    def __init__(self, places: int) -> None:
+        self.places = places
+        self._pool, self._idle = ThreadPoolExecutor(places), [Once() for _ in range(places)]
+        self._answers: SimpleQueue = SimpleQueue()
 
-    def run(self, tasks: Mapping[Name, Task], progress: Progress = SILENT) -> Iterator[tuple[Name, Any]]:
-        """Execute tasks; see `tasks.Runner.run`."""
-        results, waiting, finished = Results(tasks), turns(tasks), set()
-        running: dict[Future, tuple[Name, Once]] = {}
-        with ThreadPoolExecutor(len(self._idle)) as pool:
-            while waiting or running:
-                for name in [name for name in waiting if finished.issuperset(tasks[name].inputs)][: len(self._idle)]:
-                    waiting.remove(name)
-                    task, once = tasks[name], self._idle.pop()
-                    context = Context(results.take(task), once, SILENT)
-                    running[pool.submit(task.function, *task.arguments, context)] = name, once
-                for future in wait(running, return_when=FIRST_COMPLETED).done:
-                    name, once = running.pop(future)
-                    self._idle.append(once)
-                    finished.add(name)
-                    results.keep(name, future.result())
-                    if tasks[name].returned:
-                        yield name, future.result()
+    def ready_for(self, tasks: Mapping[Any, Task], progress: Progress) -> Threads:
+        """Return this executor."""
+        return self
+
+    def start(self, name: Any, task: Task, inputs: Mapping[Any, Any]) -> None:
+        """Give a task to a thread."""
+
+        def execute() -> None:
+            once = self._idle.pop()
+            result = task.function(*task.arguments, Context(inputs, once, SILENT))
+            self._idle.append(once)
+            self._answers.put((name, Answer(result)))
+
+        self._pool.submit(execute)
+
+    def wait(self, progress: Progress, advance: Callable[[Any, float], None]) -> tuple[Any, Answer]:
+        """Wait until a task has ended."""
+        return next_of(self._answers, progress)
+
+    def opened(self, result: Any) -> Any:
+        """Return the result as it is."""
+        return result
+
+    def end(self) -> None:
+        """Forget what has not been started."""
+        self._pool.shutdown(cancel_futures=True)
 
 
 def processor_seconds(tiles: Path, runners: AbstractContextManager[Runner]) -> tuple[float, float, float]:
@@ -200,7 +213,7 @@ def processor_seconds(tiles: Path, runners: AbstractContextManager[Runner]) -> t
     before, start = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
     own = time.process_time()
     with tempfile.TemporaryDirectory() as work, one_thread(*blas()), runners as runner:
-        extract_files(ask([tiles], [RAIL]), Path(work), parameters(), runner)
+        extract_files(Classified(ask([tiles], [RAIL])), Path(work), parameters(), runner)
     after, own = resource.getrusage(resource.RUSAGE_CHILDREN), time.process_time() - own
     others = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
     return time.perf_counter() - start, own, others

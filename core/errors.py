@@ -74,6 +74,10 @@ class DiskError(RailExtractError):
     """A file can't be written, for example because the disk is full."""
 
 
+class WorkerError(RailExtractError):
+    """A process that is to execute tasks has ended, or has another version."""
+
+
 class DeviceExhaustedError(Exception):
     """The device does not have enough memory for the cells given to it at once."""
 

@@ -24,11 +24,12 @@ from .jobs.declaration import Job
 from .jobs.result import Result
 from .parameters import DEFAULT_STEP_M, Parameters
 from .pipeline import extract_files
+from .pipeline.sources import Classified, Raw
 from .progress import SILENT, Progress
 from .rails import RailNetwork
 from .report import Origin
+from .run.processes import workers as workers_of
 from .standards import DEFAULT, RAIL_CLASS, SEARCHED_CLASSES, resolve
-from .workers.runner import workers as workers_of
 
 if TYPE_CHECKING:
     import geopandas
@@ -181,8 +182,9 @@ def extract(
         raise ParameterError(f"There is no parameter {unknown!r}: choose from {', '.join(sorted(known))}.")
     settings = Parameters(profile.gauge_m, profile.head_width_m, **{"quality_step_m": DEFAULT_STEP_M, **parameters})
     request = ask(clouds, SEARCHED_CLASSES if raw else rail_classes, crs, extent, progress)
+    source = Raw(request) if raw else Classified(request)
     with TemporaryDirectory() as folder, workers_of(workers) as runner:
-        found = extract_files(request, Path(folder), settings, runner, progress, classify=raw)
+        found = extract_files(source, Path(folder), settings, runner, progress)
     paths = tuple(paths_of(clouds))
     command = f"rail_extract.extract({', '.join(repr(str(path)) for path in paths)}, standard={standard!r})"
     return Network(**vars(found), origin=Origin(paths, profile, settings.gauges[1:], command, settings))

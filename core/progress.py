@@ -132,6 +132,18 @@ class _Span(_Relay):
         return _Span(self._listener, self._start + length * start, self._start + length * end)
 
 
+class Share(_Relay):
+    """Passes everything on; fractions go to a function that adds up those of all shares."""
+
+    def __init__(self, listener: Progress, advance: Callable[[float], None]) -> None:
+        super().__init__(listener)
+        self._advance = advance
+
+    def set_fraction(self, fraction: float) -> None:
+        """Report the fraction of this share."""
+        self._advance(fraction)
+
+
 class Recording(_Relay):
     """Passes everything on, and keeps the warnings, each once."""
 

@@ -38,9 +38,9 @@ from rail_extract.core.output.raster_file import header_for
 from rail_extract.core.progress import SILENT
 from rail_extract.core.rails import RailLine
 from rail_extract.core.raster import rasterize
+from rail_extract.core.run.loop import Runner
 from rail_extract.core.scratch import MARK, MIN_UNMARKED_AGE_S, PREFIX
 from rail_extract.core.standards import SEARCHED_CLASSES, resolve
-from rail_extract.core.tasks import InTurn
 from rail_extract.rail_extract_plugin.algorithms.frpdf_cleanup import FrpdfCleanup
 from rail_extract.rail_extract_plugin.algorithms.vectorize_rails import VectorizeRails
 from rail_extract.rail_extract_plugin.dialog.parameter_values import ParameterValues
@@ -177,7 +177,7 @@ def _write_copies(tiles: list[Path], output: Output, version: int) -> None:
     with tempfile.TemporaryDirectory() as folder:
         labels = Labels(request, Path(folder))
         labels.add(np.arange(labels.point_count))
-        write_labelled(request, Choice(version % 200), labels, output, InTurn(), SILENT)
+        write_labelled(request, Choice(version % 200), labels, output, Runner(), SILENT)
 
 
 FORMATS: dict[str, tuple[str, Callable[[Destination, int], None], Callable[[Path], set[int]]]] = {

@@ -32,7 +32,7 @@ PHRASES = {
     r"\bput up with\b": "accept, tolerate",
     r"\bgo(?:es|ing)? on on\b": "continues on",
     r"\b(?:whereof|thereof|therein|wherein|thereby|whom)\b": "split the sentence",
-    r"(?<!--)\bstretch(?:es)?\b": "square, section, length or scale factor",
+    r"\bstretch(?:es)?\b": "square, section, length or scale factor",
     r"\bcan be used without\b": "works without",
     r"\bby nobody\b": "cannot be",
     r"\bthe former\b|\bthe latter\b": "repeat the name",

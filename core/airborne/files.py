@@ -14,8 +14,8 @@ from ..frame import LocalFrame
 from ..parameters import AirborneParameters
 from ..polyline import Polyline
 from ..progress import Progress
+from ..run.tasks import Context, Task
 from ..standards import STANDARDS
-from ..tasks import Context, Task
 from .axis import axis_of_guide
 from .fitting import EMPTY, SEEN, Fitted, Stations, fit_tracks
 from .remarks import FLIGHT, are_hints, on_density, on_gauges, on_shapes, refuse_mobile

@@ -16,8 +16,8 @@ from ..errors import NoRailPointsError, ParameterError
 from ..frame import LocalFrame
 from ..polyline import Polyline, runs
 from ..progress import counted
+from ..run.tasks import READ_S, Context, Task
 from ..squares.grid import Key, points_by_square
-from ..tasks import READ_S, Context, Task, in_listed_order
 from .chaining import MIN_LENGTH_M, chains
 from .files import survey_files
 from .remarks import WIDE_FOOTPRINT_M, refuse_mobile
@@ -184,9 +184,10 @@ def sort_file(request: Request, number: int, folder: Path, context: Context) -> 
     for xyz, _, _, _ in request.read(request.headers[number], context.progress):
         local = request.zero.to_local(xyz)
         for key, chosen in points_by_square(local, SIDE_M, TILE_M).items():
+            mode = "ab" if key in counts else "wb"  # a worker may have ended half-way
             counts[key] = counts.get(key, 0) + len(chosen)
             corner = [*(np.array(key) * SIDE_M), 0.0]
-            with writing(folder), _file(folder, key, number).open("ab") as file:
+            with writing(folder), _file(folder, key, number).open(mode) as file:
                 file.write((local[chosen] - corner).astype("<f4").tobytes())
     return counts
 
@@ -203,7 +204,7 @@ def _found(run: Run, counts: Mapping[Key, int]) -> tuple[Finds, float]:
         for key in sorted(counts)
     }
     rows, densities = [], []
-    for found, density in in_listed_order(tasks, run.runner.run(tasks, run.progress)):
+    for _, (found, density) in run.runner.run(tasks, run.progress):
         rows += found
         densities.append(density)
     return Finds.joined(rows), float(np.median(densities))
@@ -215,10 +216,10 @@ def search_square(
     """Search a square, and return its finds and its points per square metre; a task."""
     files = sorted(folder.glob(f"{key[0]}_{key[1]}_*"))
     local = np.concatenate([np.fromfile(file, "<f4").reshape(-1, 3) for file in files]).astype(np.float64)
-    for file in files:
-        file.unlink()
     corner = np.array(key) * SIDE_M
     found = search(local, np.zeros(2), SIDE_M, shape, context.progress)
+    for file in files:
+        file.unlink()
     moved = [(x + corner[0], y + corner[1], direction, score) for x, y, direction, score in found]
     return moved, float(np.median(density_of(local[:, :2])))
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from ..clouds.points import Request
 from ..parameters import AirborneParameters
 from ..progress import SILENT, Progress
-from ..tasks import Runner
+from ..run.loop import Runner
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ import numpy as np
 from ..clouds.points import Request
 from ..clouds.readers import Extent, read_classes
 from ..disk import writing
-from ..tasks import READ_S, Context, Task
+from ..run.tasks import READ_S, Context, Task
 from .beside import WIDE_M
 from .ridges import HALF_M
 from .run import Run
@@ -80,8 +80,9 @@ def spool_file(
         for key, cells in around.items():
             own = points[in_cells(points["xyz"][:, :2], cells)]
             if len(own):
+                mode = "ab" if key in counts else "wb"  # a worker may have ended half-way
                 counts[key] += len(own)
-                with writing(folder), _file(folder, key, number).open("ab") as file:
+                with writing(folder), _file(folder, key, number).open(mode) as file:
                     file.write(own.tobytes())
     return dict(counts)
 

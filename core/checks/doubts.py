@@ -58,18 +58,9 @@ ALIKE_M = 20.0
 def find_jumps(track: Centerline, rails: Sequence[RailLine]) -> list[tuple[float, float]]:
     """Find the jumps of a track: places where a rail on either side steps the same way.
 
-    At switches one of the rails may be off for some metres, as no pass of a scanner puts it.
-
-    Parameters
-    ----------
-    track : Centerline
-    rails : sequence of RailLine
-        Rails of the network. Where the track does not name its rails, the centerline decides alone.
-
-    Returns
-    -------
-    list of tuple of float
-        Chainage of each step, and its size to the left in metres: the mean of the rails, which are smoothed less.
+    At switches one of the rails may be off for some metres, as no pass of a scanner puts it. Where the track does not
+    name its rails, the centerline decides alone. Returns the chainage of each step, and its size to the left in metres:
+    the mean of the rails, which are smoothed less.
     """
     line = track.line
     t = np.arange(0.0, line.length_m, STATION_STEP_M)
@@ -112,16 +103,7 @@ def _peaks(t: np.ndarray, across: np.ndarray) -> list[tuple[float, float]]:
 def doubting_jumps(
     rails: Sequence[RailLine], centerlines: Sequence[Centerline], progress: Progress = SILENT
 ) -> list[RailLine]:
-    """Warn the user of jumps, and add half of each to the standard errors of both rails: either pass may be right.
-
-    Parameters
-    ----------
-    rails : sequence of RailLine
-        With their tracks.
-    centerlines : sequence of Centerline
-        All tracks of these rails.
-    progress : Progress
-    """
+    """Warn the user of jumps, and add half of each to the standard errors of both rails: either pass may be right."""
     found = [(line, at_m, jump_m) for line in centerlines for at_m, jump_m in find_jumps(line, rails)]
     if found:
         largest = sorted(found, key=lambda one: -abs(one[2]))[:MAX_LISTED]
@@ -198,19 +180,7 @@ def _weights() -> tuple[np.ndarray, np.ndarray]:
 
 
 def strip_courses(centerlines: Sequence[Centerline], rows: np.ndarray) -> tuple[StripCourse, ...]:
-    """Describe the offsets of strips along tracks.
-
-    Parameters
-    ----------
-    centerlines : sequence of Centerline
-    rows : (k, 7) array
-        See `heads.strips.rows_of`, in the frame of the centerlines.
-
-    Returns
-    -------
-    tuple of StripCourse
-        By track and strip.
-    """
+    """Describe the offsets of strips along tracks, given `heads.strips.rows_of` in their frame, (k, 7)."""
     lines = [one.xyz[:, :2] for one in centerlines]
     feet = project(lines, rows[:, :2], REACH_M)
     return tuple(
@@ -268,14 +238,6 @@ def gauge_scatter(
 
     Both rails of a track err independently, and by as much as each other: half of the variance of the gauge is each
     one's. The stiff curve along a single rail follows errors that are as long as itself, and shows nothing of them.
-
-    Parameters
-    ----------
-    rails : sequence of RailLine
-    centerlines : sequence of Centerline
-        All tracks of these rails.
-    gauges_m : sequence of float
-        Gauges that tracks may have.
     """
     own = {rail.rail_id: (rail.sigma_mm / 1000) ** 2 for rail in rails}
     beyond: dict[int, float] = {}

@@ -100,13 +100,7 @@ class Spacings:
 
 
 def measure_spacings(xyz: np.ndarray) -> Spacings:
-    """Measure the distances between rails at some of their points.
-
-    Parameters
-    ----------
-    xyz : (n, 3) array
-        Rail points in local metres.
-    """
+    """Measure the distances between rails at some of their points, (n, 3) in local metres."""
     if len(xyz) < MIN_POINTS:
         return Spacings(np.empty(0), np.empty(0), 0)
     tree = cKDTree(xyz[:, :2])
@@ -124,10 +118,7 @@ def _near(tree: cKDTree, place: np.ndarray) -> list[int]:
 def _spacings(near: np.ndarray) -> Iterator[tuple[float, float]]:
     """Yield the distances of other rails from the rail at the origin, with the width of that rail's head.
 
-    Parameters
-    ----------
-    near : (n, 3) array
-        Points around the origin, which is a point on a rail.
+    The points around the origin, (n, 3), include one on a rail there.
     """
     direction = _direction(near)
     if direction is None:

@@ -95,15 +95,7 @@ def warn_of_rails(
 ) -> None:
     """Warn the user if a class has no rails, or if `smoothing_xy_m` moves lines off their rails.
 
-    Parameters
-    ----------
-    rails : sequence of RailLine
-        Rails of the class.
-    class_code : int
-    parameters : Parameters
-    progress : Progress
-    raw : bool
-        Whether the points were found in a raw cloud, in which the user chose no class.
+    Points that were found in a `raw` cloud have no class that the user chose.
     """
     if not rails:
         checks = "check the rail classes, the standard and MIN_LENGTH"
@@ -139,21 +131,7 @@ def displacement(line: np.ndarray, smoothing_m: float) -> float:
 def with_tracks(
     rails: Sequence[RailLine], centerlines: Sequence[Centerline], progress: Progress = SILENT
 ) -> list[RailLine]:
-    """State the tracks of each rail, and leave out lone lines that are too high or too low to be rails.
-
-    Parameters
-    ----------
-    rails : sequence of RailLine
-    centerlines : sequence of Centerline
-        All tracks of these rails.
-    progress : Progress
-        Receives a warning if lines are left out.
-
-    Returns
-    -------
-    list of RailLine
-        With their numbers as before.
-    """
+    """State the tracks of each rail, and leave out lone lines that are too high or too low to be rails."""
     kept: list[RailLine] = []
     left_out: list[tuple[RailLine, float]] = []
     for rail in rails:
@@ -175,15 +153,7 @@ def with_tracks(
 
 
 def warn_of_split_classes(rails: Sequence[RailLine], parameters: Parameters, progress: Progress) -> None:
-    """Warn the user if rails of different classes seem to be the rails of one track, or parts of one rail.
-
-    Parameters
-    ----------
-    rails : sequence of RailLine
-        With their tracks.
-    parameters : Parameters
-    progress : Progress
-    """
+    """Warn the user if rails of different classes seem to be the rails of one track, or parts of one rail."""
     codes = {rail.rail_id: rail.class_code for rail in rails}
     if len(set(codes.values())) < 2:
         return

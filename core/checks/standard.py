@@ -52,13 +52,7 @@ FEET = (0.3048, 1 / 0.3048)
 
 
 def detect_standard(request: Request, progress: Progress = SILENT) -> RailStandard:
-    """Find the rail standard that fits the first points of a cloud.
-
-    Parameters
-    ----------
-    request : Request
-    progress : Progress
-        Is told the standard, what was measured, and which other standards fit as well.
+    """Find the rail standard that fits the first points of a cloud, and say what was measured and what fits as well.
 
     Raises
     ------
@@ -154,10 +148,7 @@ def _detected(spacings: Spacings, progress: Progress) -> RailStandard:
 def warn_of_gauge(request: Request, parameters: Parameters, progress: Progress) -> bool:
     """Warn the user at once if the first points show another gauge: the run takes minutes until no track is found.
 
-    Returns
-    -------
-    bool
-        Whether the user has been warned.
+    Returns whether the user has been warned.
     """
     try:
         sample = request.sample()[0]
@@ -206,21 +197,11 @@ def _is_off_by(factor: float, xyz: np.ndarray, spacings_m: Sequence[float], para
 def head_widths(
     source: PointSource, gauges: Sequence[Gauge], progress: Progress, rails: Sequence[RailLine] = ()
 ) -> HeadWidths:
-    """Measure how wide heads look, and warn the user if another width is stated.
+    """Measure how wide heads look in the fullest square of a class, and warn the user if another width is stated.
 
     The spread of the points decides; where it is a little more than stated, which noise and side faces do as well, the
-    outline of the heads does. Another standard is asked about at a stated gauge only: elsewhere, it is asked about
-    already because of the gauge.
-
-    Parameters
-    ----------
-    source : PointSource
-        Points of one class; those in the middle of its fullest square are looked at.
-    gauges : sequence of Gauge
-        As stated; the one that fits the distance of most rails counts.
-    progress : Progress
-    rails : sequence of RailLine
-        Lines on the heads, in the frame of the source.
+    outline of the heads along the rails does. Another standard is asked about at a stated gauge only: elsewhere, it is
+    asked about already because of the gauge.
     """
     points = fullest_square(source)
     if points.strips is not None:  # strips side by side would look like a wider head

@@ -12,8 +12,9 @@ import numpy as np
 from ..errors import CloudError, CrsError, EmptyCloudError, NoRailPointsError, ParameterError, UnclassifiedError
 from ..frame import ORIGIN_STEP, LocalFrame
 from ..progress import SILENT, Progress, counted
+from ..run.loop import Runner
+from ..run.tasks import READ_S, Task
 from ..standards import LAST_CLASS
-from ..tasks import READ_S, Runner, Task, in_listed_order
 from .crs import common_crs, is_geographic, name_of, parse_crs, units, utm_zone, warn_of_scale
 from .mask import Mask
 from .passes import number_passes
@@ -297,7 +298,7 @@ def read_each(
         )
         for number, (header, own) in enumerate(zip(request.headers, arguments))
     }
-    found = list(in_listed_order(tasks, runner.run(tasks, progress)))
+    found = [result for _, result in runner.run(tasks, progress)]
     if not found:
         raise CloudError(f"Not one file could be read; the last error was: {runner.failures[-1]}")
     return found

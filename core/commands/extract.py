@@ -1,4 +1,4 @@
-"""The command `python -m rail_extract extract`: the outputs of Extract Rails, from local workers or a cluster."""
+"""The command `python -m rail_extract extract`: the outputs of Extract Rails, from this computer or a cluster."""
 
 from __future__ import annotations
 
@@ -21,13 +21,15 @@ from ..learned.model import weights_for
 from ..output.raster_file import header_for, on_one_grid, write_rasters
 from ..parameters import DEFAULT_STEP_M, DEFAULT_WORKERS, LEARNED, MAX_WORKERS, STRIPS, Parameters
 from ..pipeline import extract_files
+from ..pipeline.sources import Classified, Grown, Raw, Source
 from ..progress import Estimating, Progress, counted
 from ..rails import RailNetwork
 from ..report import Origin, summary
+from ..run.loop import Runner
+from ..run.processes import workers
 from ..scratch import scratch_folder
+from ..squares.kept import KeptResults
 from ..standards import SEARCHED_CLASSES, RailStandard, resolve
-from ..tasks import Runner
-from ..workers.runner import workers
 from .options import (
     LAYER,
     REPORT,
@@ -137,14 +139,13 @@ def _add_workers(group: argparse._ArgumentGroup) -> None:
         "--tls-cert", type=Path, metavar="PEM", help="certificate of this computer, signed by the authority"
     )
     group.add_argument("--tls-key", type=Path, metavar="PEM", help="private key of this certificate")
-    text = "show what local workers do at http://127.0.0.1:PORT, to all users of this computer (default: nowhere)"
+    text = "compute with Dask on this computer, and show what it does at http://127.0.0.1:PORT, to all users"
     group.add_argument("--dashboard", type=int, metavar="PORT", help=text)
-    text = "local workers; 0, the default, is one per core, or fewer if memory is short"
+    text = "processes that compute at a time; 0, the default, is one per core, as far as memory allows"
     group.add_argument("--workers", type=int, default=DEFAULT_WORKERS, metavar="N", help=text)
     group.add_argument("--work", type=Path, help="folder that keeps finished results, so that a restart continues")
     group.add_argument(
         "--square-tiles",
-        "--stretch-tiles",  # the name in earlier versions, which batch files still use
         type=int,
         default=Parameters.square_tiles,
         metavar="N",
@@ -229,7 +230,10 @@ def _run_in(
         wkt = request.zero.crs_wkt
         seeds = vector_module("--seeds").read_seeds(args.seeds, wkt) if args.seeds else ()
         axes = vector_module("--axis", "kilometres").read_axes(axis_of(args), None, wkt)[0] if args.axis else None
-        network = extract_files(request, folder.resolve(), parameters, runner, progress, args.classify, weights, seeds)
+        source: Source = Classified(request)
+        if raw:
+            source = Raw(request, weights) if args.classify else Grown(request, seeds)
+        network = extract_files(source, folder.resolve(), parameters, runner, progress)
     if axes is not None:
         network = replace(network, geometry=axes.along(network.geometry, network.frame, progress))
     _write(network, origin, parameters.model, request.extent, outputs)
@@ -243,24 +247,27 @@ def _run_in(
 
 
 def _on_dask(args: argparse.Namespace) -> bool:
-    """Return whether an option asks for what only Dask can do: a cluster, and what its local workers keep and show."""
-    return bool(args.scheduler or args.workers or args.work is not None or args.dashboard is not None)
+    """Return whether an option asks for Dask: a cluster, or the page about its workers."""
+    return bool(args.scheduler) or args.dashboard is not None
 
 
 @contextmanager
 def _runner(args: argparse.Namespace, folder: Path, progress: Progress) -> Iterator[Runner]:
-    """Provide the runner: Dask if it is asked for, else processes of this computer."""
+    """Provide the runner: Dask if it is asked for, else processes of this computer.
+
+    The workers of Dask exchange files, so that it keeps results in any case.
+    """
     files = _certificate_files(args, progress)
     if not _on_dask(args):
-        with workers(DEFAULT_WORKERS) as runner:
+        keeping = None if args.work is None else KeptResults(folder)
+        with workers(args.workers, keeping=keeping, tolerant=True) as runner:
             yield runner
         return
-    from ..cluster.runner import DaskRunner
-    from ..cluster.workers import Certificates, connect
+    from ..run.cluster import Certificates, Cluster, running, started
 
     certificates = Certificates(*files) if files else None
-    with connect(args.scheduler, args.workers or None, certificates, args.dashboard) as client:
-        yield DaskRunner(client, folder)
+    with running(args.scheduler, certificates) if args.scheduler else started(args.workers, args.dashboard) as client:
+        yield Runner(Cluster(client), KeptResults(folder), tolerant=True)
 
 
 def _weights(args: argparse.Namespace) -> Path | None:

@@ -23,9 +23,9 @@ from ..jobs.result import Result
 from ..jobs.shared import WEB_PAGES
 from ..jobs.values import Rows, Values
 from ..progress import Progress
+from ..run.loop import Runner
+from ..run.processes import workers
 from ..scratch import scratch_folder
-from ..tasks import Runner
-from ..workers.runner import workers
 from .options import vector_module
 
 if TYPE_CHECKING:

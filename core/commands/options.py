@@ -6,7 +6,6 @@ import argparse
 import signal
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import AbstractContextManager
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
@@ -17,11 +16,9 @@ from ..clouds.points import Request, ask
 from ..disk import Destination, writing
 from ..errors import ParameterError
 from ..jobs.shared import DECREASING, INCREASING
-from ..parameters import DEFAULT_WORKERS, GEOMETRY, LEARNED, LEAVE_OUT, MAX_WORKERS, METHODS, Parameters
+from ..parameters import GEOMETRY, LEARNED, LEAVE_OUT, METHODS, Parameters
 from ..progress import Progress
 from ..standards import DEFAULT, Gauge, RailStandard, read_gauges
-from ..tasks import Runner
-from ..workers.runner import workers
 
 
 def add_tiles_argument(parser: argparse.ArgumentParser) -> None:
@@ -235,25 +232,6 @@ def extent_of(text: str | None) -> tuple[float, float, float, float] | None:
     except ValueError:
         raise ParameterError(f'--extent "{text}" should be four numbers: xmin,ymin,xmax,ymax.') from None
     return xmin, ymin, xmax, ymax
-
-
-def add_workers_argument(parser: argparse._ActionsContainer) -> None:
-    """Declare the number of workers."""
-    text = "processes that compute at a time; 0, the default, is one per core, as far as memory allows"
-    parser.add_argument("--workers", type=int, default=DEFAULT_WORKERS, metavar="N", help=text)
-
-
-def runner_of(args: argparse.Namespace) -> AbstractContextManager[Runner]:
-    """Provide the runner with the workers that are asked for.
-
-    Raises
-    ------
-    ParameterError
-        No computer has that many.
-    """
-    if not 0 <= args.workers <= MAX_WORKERS:
-        raise ParameterError(f"--workers must be a number from 0 to {MAX_WORKERS}, not {args.workers}.")
-    return workers(args.workers)
 
 
 class Console(Progress):

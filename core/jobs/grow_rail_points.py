@@ -117,7 +117,7 @@ def _run(values: Values, progress: Progress) -> Result:
     from ..labelling.files import Choice, plan_output
     from ..labelling.growing import grow_files
     from ..output.layers import stops_layer
-    from ..tasks import InTurn
+    from ..run.loop import Runner
 
     progress, standard = Estimating(progress), values.standard()
     choice = Choice(values["RAIL_CLASS"], values.rails_only(), reset=False)
@@ -126,7 +126,7 @@ def _run(values: Values, progress: Progress) -> Result:
     settings = GrowSettings(standard.gauge_m, standard.head_width_m, values.growth())
     seeds = values.seeds(values.cloud_crs())
     with values.scratch() as folder:
-        grown = grow_files(request, seeds, settings, choice, output, folder, InTurn(), progress)
+        grown = grow_files(request, seeds, settings, choice, output, folder, Runner(), progress)
     return replace(classified(grown, request), layers={"STOPS": lambda: stops_layer(grown.stops)})
 
 

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from ..alignment.placed_axes import PlacedAxes
     from ..clouds.points import Request
     from ..progress import Progress
-    from ..tasks import Runner
+    from ..run.loop import Runner
     from .lines import Lines
 
 NUMBERS = {

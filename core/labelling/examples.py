@@ -13,9 +13,9 @@ from ..disk import writing
 from ..errors import NoRailPointsError, ParameterError
 from ..learned.examples import Examples, save_index, write_square
 from ..progress import SILENT, Progress
+from ..run.loop import Runner
 from ..scratch import scratch_folder
 from ..squares.grid import Square
-from ..tasks import InTurn
 from .finding import files_of, read_square, sort_files
 
 
@@ -48,7 +48,7 @@ def write_examples(
     reading, cutting = progress.divide((1.0, 1.0))
     census = np.zeros(2, dtype=np.int64)
     with writing(folder), scratch_folder(folder) as squares:
-        sorted_files = sort_files(request, settings, squares, InTurn(), reading, with_class=True)
+        sorted_files = sort_files(request, settings, squares, Runner(), reading, with_class=True)
         keys = sorted({key for one in sorted_files for key in one.counts})
         entries = []
         for file, key in enumerate(cutting.follow(keys)):

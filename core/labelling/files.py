@@ -19,9 +19,10 @@ from ..errors import DiskError, ParameterError, RailExtractError
 from ..grow.growth import Stop
 from ..progress import SILENT, Progress
 from ..rails import SearchFigures
+from ..run.loop import Runner
+from ..run.tasks import READ_S, Context, Task
 from ..scratch import scratch_folder
 from ..standards import RAIL_CLASS
-from ..tasks import READ_S, Context, Runner, Task, in_listed_order
 from .finding import find_rail_points, report
 
 UNCLASSIFIED = 1
@@ -301,7 +302,7 @@ class _Writer:
                 )
                 for place, (name, header) in enumerate(zip(output.names, self._request.headers))
             }
-            counts = list(in_listed_order(tasks, runner.run(tasks, progress)))
+            counts = [count for _, count in runner.run(tasks, progress)]
             _check_complete(runner)
             tiles = [
                 (f"./{output.file.stem}/{name}", count, header.extent)

@@ -26,9 +26,10 @@ from ..learned.model import Classifier
 from ..learned.square import label_square
 from ..progress import SILENT, Progress, counted
 from ..rails import ENOUGH_CELLS_PER_M, SearchFigures
+from ..run.loop import Runner
+from ..run.tasks import Context, Task
 from ..squares.grid import Key, Square, points_by_square, unique_keys
 from ..standards import LAST_CLASS
-from ..tasks import Context, Runner, Task, in_listed_order
 
 POINT = np.dtype([("xyz", "<f8", 3), ("number", "<i8"), ("mark", "<u4")])
 """A point on disk: coordinates in units of the CRS, its number among all points of all files, and its mark, see
@@ -114,7 +115,8 @@ def find_rail_points(
         tasks = {key: _search_task(key, sorted_files, request.zero, own) for key in keys}
         start, searched = searched, min(searched + len(keys), len(counts))
         share = searching.span(start / len(counts), searched / len(counts))
-        yield from in_listed_order(tasks, runner.run(tasks, share))
+        for _, found in runner.run(tasks, share):
+            yield found
 
     for found in search_alike(sorted(counts, key=lambda key: (-counts[key], key)), search):
         if found.figures != SearchFigures():

@@ -24,8 +24,8 @@ from ..polyline import Polyline
 from ..progress import SILENT, Progress
 from ..rails import SearchFigures
 from ..raster import BORDER_CELLS, cell_size
+from ..run.loop import Runner
 from ..squares.grid import Key
-from ..tasks import InTurn, Runner
 from .files import Choice, Labels, Output, Result, write_labelled
 from .finding import box_of, files_of, read_square, sort_files
 
@@ -178,7 +178,7 @@ class Cloud:
         with writing(folder):
             squares.mkdir()
         own = replace(settings.classification, guide=near)
-        self._sorted, self._zero = sort_files(request, own, squares, InTurn(), progress), request.zero
+        self._sorted, self._zero = sort_files(request, own, squares, Runner(), progress), request.zero
         self._local = lru_cache(maxsize=1)(lambda key: self._zero.to_local(self.read(key)["xyz"]))
         self.heads = OnHeads(self._local, settings)
 

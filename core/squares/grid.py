@@ -17,6 +17,7 @@ import numpy as np
 from ..clouds.points import RailPoints
 from ..frame import LocalFrame
 from ..heads.on_heads import heads_of
+from ..rails import SearchFigures
 from ..raster import TILE, RailRaster
 
 OVERLAP_M = 40.0
@@ -54,27 +55,12 @@ class Square:
 
     @classmethod
     def on_grid(cls, key: Key, side_m: float, frame: LocalFrame) -> Square:
-        """Create a square of the grid.
-
-        Parameters
-        ----------
-        key : tuple of int
-        side_m : float
-        frame : LocalFrame
-            Local frame of the cloud.
-        """
+        """Create a square of the grid of a cloud, given its local frame."""
         corner = np.array([*key, 0]) * side_m / frame.horizontal_unit_m
         return cls(key, replace(frame, origin=corner), side_m)
 
     def holds(self, xyz: np.ndarray, margin_m: float = 0.0) -> np.ndarray:
-        """Return which places are in the square or at most `margin_m` outside, (n,) bool.
-
-        Parameters
-        ----------
-        xyz : (n, 2) or (n, 3) array
-            Local metres of the square.
-        margin_m : float
-        """
+        """Return which places, (n, 2) or (n, 3) local metres, are in the square or at most `margin_m` outside."""
         if self.is_whole_plane:
             return np.ones(len(xyz), dtype=bool)
         inside = (xyz[:, :2] >= -margin_m) & (xyz[:, :2] < self.side_m + margin_m)
@@ -112,6 +98,27 @@ class PointSource(Protocol):
 
     def part(self, square: Square) -> PointSource:
         """Return the source without the squares that are neither `square` nor its neighbours, where that is smaller."""
+
+
+@dataclass(frozen=True)
+class SortedPoints:
+    """Rail points by class and square.
+
+    Attributes
+    ----------
+    classes : sequence of PointSource
+    search : SearchFigures or None
+        What was found, if the points are from a raw cloud.
+    only_pairs : bool
+        Whether nothing but its partner tells a rail from other ridges, where heads are blunt.
+    is_warned : bool
+        Whether the user has been warned of another gauge.
+    """
+
+    classes: Sequence[PointSource]
+    search: SearchFigures | None = None
+    only_pairs: bool = False
+    is_warned: bool = False
 
 
 class MemorySource:

@@ -15,7 +15,8 @@ from ..lines.smoothing import GAP_SIGMAS
 from ..polyline import runs
 from ..progress import SILENT, Progress
 from ..rails import RailLine
-from ..tasks import Context, Runner, Task
+from ..run.loop import Runner
+from ..run.tasks import Context, Task
 from ..tracks.geometry import PROFILE_SIGMA_M
 from .grid import Key, PointSource, Square, lay_out, unique_keys
 
@@ -40,24 +41,8 @@ def measure_rails(
 ) -> list[RailLine]:
     """Measure rails again for track geometry, like `elevation.measure_again`, using the points of one square at a time.
 
-    Parameters
-    ----------
-    rails : sequence of RailLine
-        In the frame of the sources.
-    sources : sequence of PointSource
-        One per class; rails of other classes remain as they are.
-    head_width_m : float or (n,) array
-        Width of the heads, of all rails or of each.
-    runner : Runner
-        Executes the measurement in each square; where it fails, rails keep the heights and support that they have.
-    progress : Progress
-    align : bool
-        Whether the strips of the points are moved onto their mean.
-
-    Returns
-    -------
-    list of RailLine
-        In the order given.
+    Rails of other classes than the sources remain as they are, and so do heights and support where a square fails.
+    `head_width_m` is that of all rails or of each, (n,); `align` moves strips onto their mean.
     """
     measured, widths_m = list(rails), np.broadcast_to(head_width_m, len(rails))
     for source, share in zip(sources, progress.split(len(sources))):

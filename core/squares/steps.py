@@ -40,13 +40,7 @@ VECTORIZE, SMOOTH, REFINE, ELEVATE = 0.45, 0.05, 0.25, 0.25
 
 
 def square_side(parameters: Parameters) -> float:
-    """Return the side of the squares in metres.
-
-    Raises
-    ------
-    ParameterError
-        The squares would overlap with more than their neighbours.
-    """
+    """Return the side of the squares in metres; `ParameterError` if they overlap with more than their neighbours."""
     tile_m = _tile_side(parameters)
     smallest = math.ceil(OVERLAP_M / tile_m)
     if parameters.square_tiles < smallest:
@@ -103,17 +97,7 @@ def rails_of_square(
     parameters: Parameters,
     progress: Progress = SILENT,
 ) -> SquareRails:
-    """Draw the rails of a square.
-
-    Parameters
-    ----------
-    source : PointSource
-    square : Square
-    rasters : mapping of Key to RailRaster
-        Cleaned rasters of the square and of its neighbours; a neighbour may be missing.
-    parameters : Parameters
-    progress : Progress
-    """
+    """Draw the rails of a square, given its cleaned raster and those of the neighbours that have one."""
     tiles = overlap_tiles(parameters)
     raster = mosaic(rasters, square, tiles)
     overlap_m = tiles * _tile_side(parameters)
@@ -134,16 +118,7 @@ def whole_rails(
 ) -> list[RailLine]:
     """Join the rails of all squares, drop the short ones, cut turns too sharp for a rail, simplify and number them.
 
-    Parameters
-    ----------
-    results : iterable of SquareRails
-        An iterator that lets go of what it yields saves a third of the memory of a long railway.
-    frame : LocalFrame
-        Local frame of the result.
-    parameters : Parameters
-    first_id : int
-    progress : Progress
-        Receives a warning if lines had to be cut.
+    Results that are let go of once they were yielded save a third of the memory of a long railway.
     """
     rails = [rail for rail in join(results, frame) if rail.length_m >= parameters.min_length_m]
     return _numbered(numbered(rails), parameters, first_id, progress)
@@ -159,16 +134,7 @@ def lines_of(
 ) -> list[RailLine]:
     """Turn the cleaned raster of one class into rails: vectorize, smooth, move onto the heads, add heights, simplify.
 
-    Parameters
-    ----------
-    raster : RailRaster
-    class_code : int
-    points : RailPoints or None
-        Without points the rails stay where the raster shows them, and have no heights.
-    parameters : Parameters
-    progress : Progress
-    first_id : int
-        `rail_id` of the first rail.
+    Without points the rails stay where the raster shows them, and have no heights.
     """
     drawn, _, _ = _all_vertices(raster, class_code, points, parameters, progress)
     return _numbered(drawn, parameters, first_id, progress)
@@ -211,19 +177,7 @@ def measure_lines(
     cell_m: float,
     progress: Progress = SILENT,
 ) -> tuple[tuple[RailLine, ...], np.ndarray]:
-    """Move drawn lines onto their heads and measure them; see `_all_vertices`.
-
-    Parameters
-    ----------
-    network : LineNetwork
-        From `draw_lines`.
-    points : RailPoints or None
-    class_code : int
-    parameters : Parameters
-    cell_m : float
-        Cell size of the raster from which the lines were drawn.
-    progress : Progress
-    """
+    """Move the lines of `draw_lines` onto their heads and measure them; see `_all_vertices`."""
     refining, elevating = progress.divide((REFINE, ELEVATE))
     elevation = ElevationParameters(
         tolerance_xy_m=parameters.tolerance_xy_m,

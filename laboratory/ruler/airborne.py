@@ -19,7 +19,7 @@ from ...core.airborne.survey import SWITCH, AirborneTrack, Guide, Survey
 from ...core.clouds.points import ask
 from ...core.parameters import AirborneParameters
 from ...core.polyline import Polyline
-from ...core.tasks import InTurn
+from ...core.run.loop import Runner
 from ..airborne.catalogue import FlownScene
 from ..airborne.designs import SPACING_M, Design
 from ..airborne.ground import STEP_M
@@ -143,7 +143,7 @@ def proposed(scene: FlownScene) -> Proposals:
 def _run(scene: FlownScene, folder: Path) -> Run:
     write_airborne(scene.cloud, folder / "cloud.las")
     parameters = AirborneParameters(GAUGE_M, SPACING_M - GAUGE_M, footprint_m=scene.flight.footprint_m)
-    return Run(ask(folder / "cloud.las", CLASSES), parameters, folder / "points", InTurn())
+    return Run(ask(folder / "cloud.las", CLASSES), parameters, folder / "points", Runner())
 
 
 def survey_figures(scene: FlownScene) -> dict[str, float]:

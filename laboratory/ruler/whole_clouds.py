@@ -16,8 +16,8 @@ from ...core.grow.settings import GrowSettings
 from ...core.labelling.finding import search_square
 from ...core.progress import SILENT, Progress
 from ...core.rails import SearchFigures
+from ...core.run.tasks import Context, Once
 from ...core.squares.grid import Key, points_by_square, unique_keys
-from ...core.tasks import Context, Once
 
 
 class Part(NamedTuple):

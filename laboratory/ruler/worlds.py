@@ -21,13 +21,14 @@ from ...core.comparison.pieces import cut
 from ...core.errors import RailExtractError
 from ...core.parameters import Parameters
 from ...core.pipeline import extract_files
+from ...core.pipeline.sources import Classified, Raw
 from ...core.polyline import Chords, Polyline
 from ...core.rails import RailNetwork
 from ...core.report import Finding, list_findings
 from ...core.report.findings import examine
 from ...core.report.listing import verdict
+from ...core.run.loop import Runner
 from ...core.standards import RAIL_CLASS, SEARCHED_CLASSES
-from ...core.tasks import InTurn
 from ..worlds.world import World
 from .lines import Match, match
 
@@ -150,7 +151,7 @@ def extract_world(world: World) -> RailNetwork:
         request = ask([path], SEARCHED_CLASSES if raw else [RAIL_CLASS], None, None)
         squares = Path(folder) / "squares"
         squares.mkdir()
-        return extract_files(request, squares, parameters, InTurn(), classify=raw)
+        return extract_files(Raw(request) if raw else Classified(request), squares, parameters, Runner())
 
 
 def run(world: World) -> Judged:

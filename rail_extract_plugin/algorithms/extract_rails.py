@@ -102,6 +102,7 @@ class ExtractRails(RailAlgorithm):
     def compute(self, job: Job, values: ParameterValues, progress: Progress) -> dict[str, Any]:
         """Extract the rails and tracks, then write the outputs."""
         from ...core.pipeline import extract_files
+        from ...core.pipeline.sources import Classified, Grown, Raw, Source
         from ...core.report import Origin, summary
 
         progress = Estimating(progress)
@@ -115,8 +116,11 @@ class ExtractRails(RailAlgorithm):
             quality_step_m=values.number("STEP") if any(map(values.wanted, MEASURED)) else None,
             keep_cleaned=values.wanted("CLEANED"),
         )
+        source: Source = Classified(request)
+        if classify or job.seeds:
+            source = Raw(request, job.weights) if classify else Grown(request, job.seeds)
         with points_folder() as folder, values.runner() as runner:
-            network = extract_files(request, folder, settings, runner, progress, classify, job.weights, job.seeds)
+            network = extract_files(source, folder, settings, runner, progress)
         progress.check()
         if job.axes:
             network = replace(network, geometry=job.axes.along(network.geometry, network.frame, progress))

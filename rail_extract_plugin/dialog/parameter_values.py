@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from ...core.jobs.lines import Lines
     from ...core.output.raster_file import RasterHeader
     from ...core.progress import Progress
-    from ...core.tasks import Runner
+    from ...core.run.loop import Runner
 
 TYPES_WITHOUT_LINES = (
     QgsWkbTypes.GeometryType.PointGeometry,
@@ -161,7 +161,7 @@ class ParameterValues(Values):
 
     def runner(self) -> AbstractContextManager[Runner]:
         """Provide the runner with as many processes as WORKERS asks for."""
-        from ...core.workers.runner import workers
+        from ...core.run.processes import workers
 
         return workers(int(self.number("WORKERS")), known_interpreter)
 

@@ -8,7 +8,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from ...core.errors import RailExtractError
-from ...core.workers.process import Interpreter
+from ...core.run.worker import Interpreter
 from . import processes
 from .dependencies import version_of
 

@@ -30,9 +30,9 @@ def tiles(tmp_path_factory):
 @pytest.fixture(scope="session")
 def client():
     """Two local workers."""
-    from rail_extract.core.cluster.workers import connect
+    from rail_extract.core.run.cluster import started
 
-    with connect(None, 2) as client:
+    with started(2) as client:
         yield client
 
 

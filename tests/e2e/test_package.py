@@ -31,7 +31,7 @@ def test_zip_is_a_single_folder_that_qgis_recognizes(names):
 
 def test_zip_contains_only_the_product(names):
     assert any(re.fullmatch(r"rail_extract/models/.*\.npz", name) for name in names)
-    assert {"rail_extract/core/pipeline.py", "rail_extract/resources/styles/rails.qml"} <= set(names)
+    assert {"rail_extract/core/pipeline/__init__.py", "rail_extract/resources/styles/rails.qml"} <= set(names)
     assert not [name for name in names if re.search(r"/(tests|tools|benchmarks|\.ci)/|\.pyc$", name)]
 
 

@@ -24,7 +24,7 @@ from rail_extract.core import pipeline
 from rail_extract.core.disk import Destination
 from rail_extract.core.errors import RailExtractError
 from rail_extract.core.frpdf import engine, models
-from rail_extract.core.workers import process, runner
+from rail_extract.core.run import processes, worker
 from rail_extract.rail_extract_plugin.algorithms import base
 from rail_extract.rail_extract_plugin.dialog import parameter_values
 from rail_extract.rail_extract_plugin.setup import dependencies
@@ -222,13 +222,13 @@ def divided(bench):
     (bench.folder / "tiles").mkdir()
     for number in range(2):
         bench.cloud(bench.track(length_m=6.0) + [6.0 * number, 0.0, 0.0], f"tiles/{number}.las")
-    bench.patch.setattr(runner, "WORTH_S", 0.0)
+    bench.patch.setattr(processes, "WORTH_S", 0.0)
     return {"INPUT": bench.folder / "tiles", "ITERATIONS": 1, "WORKERS": 2}
 
 
 def ended_workers(bench):
     """The system ends a worker process, as Linux does if memory is short."""
-    bench.patch.setattr(process.Worker, "send", lambda self, *task: os.kill(self.number, signal.SIGKILL))
+    bench.patch.setattr(worker.Worker, "send", lambda self, *task: os.kill(self.number, signal.SIGKILL))
     return divided(bench)
 
 

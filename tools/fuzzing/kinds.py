@@ -112,11 +112,11 @@ def _spooled(cloud: Path, folder: Path) -> Sequence:
 
 def _make_stored(folder: Path) -> list[Path]:
     """Store the raster and the rails of a square."""
-    from rail_extract.core.cluster.store import save
     from rail_extract.core.frame import LocalFrame
     from rail_extract.core.rails import RailLine
     from rail_extract.core.raster import rasterize
     from rail_extract.core.squares.grid import Square
+    from rail_extract.core.squares.kept import save
     from rail_extract.core.squares.pieces import SquareRails
 
     xyz = np.random.default_rng(0).uniform(0, 20, (500, 3))
@@ -129,13 +129,9 @@ def _make_stored(folder: Path) -> list[Path]:
 
 def _read_stored(path: Path) -> None:
     """Load a result as the runner does: it computes what is damaged again."""
-    from rail_extract.core.cluster.store import DamagedError, Stored, load
-    from rail_extract.core.errors import RailExtractError
+    from rail_extract.core.squares.kept import Stored, load
 
-    try:
-        load(Stored(str(path)))
-    except DamagedError as error:
-        raise RailExtractError(" ".join(str(error).split())) from error
+    load(Stored(str(path)))
 
 
 def _keep_all(codes: np.ndarray, places: Callable[[np.ndarray], np.ndarray]) -> tuple[np.ndarray, np.ndarray]:

@@ -15,7 +15,7 @@ from rail_extract.core.errors import CloudError, NoRailPointsError, ParameterErr
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.parameters import AirborneParameters
 from rail_extract.core.progress import Progress
-from rail_extract.core.tasks import InTurn
+from rail_extract.core.run.loop import Runner
 from rail_extract.laboratory.airborne.flight import AirborneCloud
 from rail_extract.laboratory.airborne.write import ORIGIN, las_of, write_airborne
 from rail_extract.laboratory.scenes.copc import write_copc
@@ -42,7 +42,7 @@ def guides(flown, move=(0.0, 0.0)):
 
 
 def survey(paths, given, folder, parameters=PARAMETERS, codes=(1, 2), progress=None):
-    return survey_files(Run(ask(paths, codes), parameters, folder / "points", InTurn(), progress or Log()), given)
+    return survey_files(Run(ask(paths, codes), parameters, folder / "points", Runner(), progress or Log()), given)
 
 
 def write_tiles(cloud, axis, folder):

@@ -9,7 +9,7 @@ from rail_extract.core.airborne.run import Run
 from rail_extract.core.clouds.points import ask
 from rail_extract.core.errors import CloudError, NoRailPointsError, ParameterError
 from rail_extract.core.parameters import AirborneParameters
-from rail_extract.core.tasks import InTurn
+from rail_extract.core.run.loop import Runner
 from rail_extract.laboratory.airborne.flight import AirborneCloud, Flight, fly
 from rail_extract.laboratory.airborne.landscapes import countryside
 from rail_extract.laboratory.airborne.write import ORIGIN, write_airborne
@@ -20,7 +20,7 @@ PARAMETERS = AirborneParameters(1.435, 0.072, footprint_m=0.25)
 
 def proposed(cloud, folder, codes=(1, 2), parameters=PARAMETERS):
     write_airborne(cloud, folder / "cloud.las")
-    return propose_guides(Run(ask(folder / "cloud.las", codes), parameters, folder / "points", InTurn()))
+    return propose_guides(Run(ask(folder / "cloud.las", codes), parameters, folder / "points", Runner()))
 
 
 def test_guides_lie_on_both_tracks_and_have_few_vertices(flown, tmp_path):

@@ -10,9 +10,10 @@ from rail_extract.__main__ import main
 from rail_extract.core.clouds.points import ask
 from rail_extract.core.errors import NoRailPointsError
 from rail_extract.core.pipeline import Parameters, extract_files
+from rail_extract.core.pipeline.sources import Grown, Raw
+from rail_extract.core.run import processes
+from rail_extract.core.run.loop import Runner
 from rail_extract.core.standards import SEARCHED_CLASSES
-from rail_extract.core.tasks import InTurn
-from rail_extract.core.workers import runner
 from rail_extract.laboratory.scenes.raw_shapes import MIDDLE, flat, rough, with_track
 from rail_extract.laboratory.scenes.raw_strips import SPACING_M, strip
 
@@ -67,7 +68,7 @@ def test_a_classified_copy_is_written(save, tmp_path, capsys):
 
 def test_workers_change_nothing(save, tmp_path, monkeypatch):
     """However small the cloud is."""
-    monkeypatch.setattr(runner, "WORTH_S", 0.0)
+    monkeypatch.setattr(processes, "WORTH_S", 0.0)
     source = str(save(scene()[0]))
     for count in ("1", "2"):
         assert main(["classify", source, "--output", str(tmp_path / f"{count}.las"), "--workers", count]) == 0
@@ -79,7 +80,7 @@ def test_rails_are_extracted_from_a_raw_cloud(save, tmp_path):
     parameters = Parameters(1.435, 0.072, passes=1, engine="OPENCV")
     folder = tmp_path / "work"
     folder.mkdir()
-    network = extract_files(request, folder, parameters, InTurn(), classify=True)
+    network = extract_files(Raw(request), folder, parameters, Runner())
     assert [rail.class_code for rail in network.rails] == [10, 10]
     (track,) = network.centerlines
     assert track.gauge_mm == pytest.approx(1435, abs=5)  # ten metres of bars without round corners
@@ -91,14 +92,14 @@ def test_rails_are_extracted_from_a_raw_cloud(save, tmp_path):
 def test_a_raw_cloud_with_few_points_is_doubted(save, tmp_path):
     xyz, _ = with_track(flat(20.0, rng=np.random.RandomState(3), per_m2=80), 1.435, 0.072, 0.3)
     request = ask([save(rough(xyz, np.random.RandomState(4), 0.01, 0.01))], SEARCHED_CLASSES)
-    network = extract_files(request, tmp_path, Parameters(1.435, 0.072, engine="OPENCV"), InTurn(), classify=True)
+    network = extract_files(Raw(request), tmp_path, Parameters(1.435, 0.072, engine="OPENCV"), Runner())
     assert [warning for warning in network.warnings if "cells with points per metre; below 10" in warning]
 
 
 def test_points_of_a_raw_cloud_that_give_no_rail_are_not_blamed_on_the_classes(save, tmp_path):
     request = ask([save(scene()[0])], SEARCHED_CLASSES)
     parameters = Parameters(1.435, 0.072, engine="OPENCV", min_length_m=1000.0)
-    network = extract_files(request, tmp_path, parameters, InTurn(), classify=True)
+    network = extract_files(Raw(request), tmp_path, parameters, Runner())
     assert network.search.points and not network.rails
     assert [warning for warning in network.warnings if "give no rail" in warning and "MIN_LENGTH" in warning]
     assert not [warning for warning in network.warnings if "rail classes" in warning]
@@ -108,7 +109,7 @@ def test_ground_has_no_rails_to_extract(save, tmp_path):
     rng = np.random.RandomState(1)
     request = ask([save(rough(flat(8.0, rng=rng, per_m2=500), rng))], SEARCHED_CLASSES)
     with pytest.raises(NoRailPointsError, match="No rail was found in the raw cloud: check the rail standard"):
-        extract_files(request, tmp_path, Parameters(1.435, 0.072, engine="OPENCV"), InTurn(), classify=True)
+        extract_files(Raw(request), tmp_path, Parameters(1.435, 0.072, engine="OPENCV"), Runner())
 
 
 def along_track(left=0.0, angle=0.3, length=60.0):
@@ -217,7 +218,7 @@ def test_rails_grow_and_are_extracted_in_one_call(save, tmp_path):
     parameters = Parameters(1.435, 0.072, passes=1, engine="OPENCV")
     folder = tmp_path / "work"
     folder.mkdir()
-    network = extract_files(request, folder, parameters, InTurn(), seeds=seeds)
+    network = extract_files(Grown(request, seeds), folder, parameters, Runner())
     assert [rail.length_m for rail in network.rails] == pytest.approx([15.5, 15.5], abs=0.6)
     middles = sorted(float(np.median(network.frame.to_crs(rail.xyz)[:, 1])) - CORNER[1] for rail in network.rails)
     assert middles == pytest.approx([-SPACING_M / 2, SPACING_M / 2], abs=0.01)

@@ -10,10 +10,10 @@ from rail_extract.core.clouds.points import ask
 from rail_extract.core.clouds.vpc import list_tiles
 from rail_extract.core.errors import Cancelled, CloudError, DiskError, ParameterError, RailExtractError
 from rail_extract.core.labelling.files import Choice, classify_files, plan_output
-from rail_extract.core.progress import SILENT, Progress, Recording
+from rail_extract.core.progress import Progress, Recording
+from rail_extract.core.run.loop import Answer, InTurn, Runner
 from rail_extract.core.scratch import scratch_folder
 from rail_extract.core.standards import SEARCHED_CLASSES
-from rail_extract.core.tasks import InTurn
 from rail_extract.laboratory.scenes.raw_shapes import flat, rough, with_track
 
 GAUGE, WIDTH = 1.435, 0.072
@@ -56,7 +56,7 @@ def classify(tmp_path, paths, output, choice=TEN, progress=None, runner=None):
     planned = plan_output(paths, output, choice.class_code, progress)
     request = ask(paths, SEARCHED_CLASSES, None, None, progress)
     with scratch_folder(tmp_path) as work:
-        return classify_files(request, SETTINGS, choice, planned, work, runner or InTurn(), progress), progress
+        return classify_files(request, SETTINGS, choice, planned, work, runner or Runner(), progress), progress
 
 
 @pytest.mark.parametrize(
@@ -155,18 +155,19 @@ def test_tiles_are_classified_as_one_cloud(tmp_path, scene):
 
 
 class Backwards(InTurn):
-    """Returns the results of tasks in the opposite order, and fails where it is told to."""
+    """Executes tasks in the opposite order, and fails where it is told to."""
 
-    def __init__(self, failing=""):
+    places = 99
+
+    def __init__(self, failing="nothing"):
         super().__init__()
         self.failing = failing
 
-    def run(self, tasks, progress=SILENT):
-        for name, result in reversed(list(super().run(tasks, progress))):
-            if self.failing and tasks[name].label.startswith(self.failing):
-                self.failures.append(f"{tasks[name].label} failed (reason).")
-            else:
-                yield name, result
+    def wait(self, progress, advance):
+        self._started.rotate(1)
+        does_fail = self._started[0][1].label.startswith(self.failing)
+        name, answer = super().wait(progress, advance)
+        return name, Answer(error=ValueError("reason")) if does_fail else answer
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows lets few users make links")
@@ -189,7 +190,7 @@ def test_any_runner_gives_the_same_files(tmp_path, scene):
     for name, part in zip(("a.las", "b.las", "c.las"), np.array_split(scene[0], 3)):
         save(tiles / name, part)
     written = []
-    for runner in (InTurn(), Backwards()):
+    for runner in (Runner(), Runner(Backwards())):
         result, _ = classify(tmp_path, [tiles], tmp_path / "new.vpc", runner=runner)
         written.append([result.figures, *(one.read_bytes() for one in sorted((tmp_path / "new").iterdir()))])
     assert written[0][0].paired_m > 14
@@ -203,7 +204,7 @@ def test_nothing_is_written_where_a_part_failed(tmp_path, scene, failing):
     for name, part in zip(("a.las", "b.las"), np.array_split(scene[0], 2)):
         save(tiles / name, part)
     with pytest.raises(RailExtractError, match=rf"{failing}.* failed \(reason\). Nothing was written."):
-        classify(tmp_path, [tiles], tmp_path / "new.vpc", runner=Backwards(failing))
+        classify(tmp_path, [tiles], tmp_path / "new.vpc", runner=Runner(Backwards(failing), tolerant=True))
     assert [one.name for one in tmp_path.iterdir()] == ["raw"]
 
 
@@ -249,7 +250,7 @@ def test_of_two_runs_onto_one_output_the_later_one_says_so_and_changes_nothing(t
 
     def run(choice, planned):
         with scratch_folder(tmp_path) as work:
-            classify_files(request, SETTINGS, choice, planned, work, InTurn())
+            classify_files(request, SETTINGS, choice, planned, work, Runner())
 
     def content():
         return {path: path.read_bytes() for path in [output, *tmp_path.glob("new/*")]}

@@ -12,9 +12,9 @@ from rail_extract.core.labelling.files import Choice, plan_output
 from rail_extract.core.labelling.growing import grow_files
 from rail_extract.core.parameters import GrowParameters
 from rail_extract.core.progress import Progress, Recording
+from rail_extract.core.run.loop import Runner
 from rail_extract.core.scratch import scratch_folder
 from rail_extract.core.standards import SEARCHED_CLASSES
-from rail_extract.core.tasks import InTurn
 from rail_extract.laboratory.scenes.raw_strips import GAUGE_M, SPACING_M, WIDTH_M, strip
 
 CORNER = np.array([500_003.0, 5_000_008.0, 100.0])
@@ -52,7 +52,7 @@ def grow(tmp_path, paths, output, seeds, choice=TEN, **changes):
     settings = GrowSettings(GAUGE_M, WIDTH_M, GrowParameters(**changes))
     seeds = [np.atleast_2d(seed) for seed in seeds]
     with scratch_folder(tmp_path) as work:
-        return grow_files(request, seeds, settings, choice, planned, work, InTurn(), progress), progress
+        return grow_files(request, seeds, settings, choice, planned, work, Runner(), progress), progress
 
 
 def test_only_the_class_of_points_on_the_rails_changes(tmp_path):

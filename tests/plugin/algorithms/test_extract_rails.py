@@ -21,8 +21,8 @@ from qgis.core import (
     QgsVectorLayer,
 )
 from rail_extract.core.kernels import blas
+from rail_extract.core.run import processes
 from rail_extract.core.scratch import PREFIX
-from rail_extract.core.workers import runner
 from rail_extract.rail_extract_plugin.reading.geotiff import read_header
 
 POINTS = f"{PREFIX}*/*/10_*"
@@ -342,7 +342,7 @@ def test_libraries_have_one_thread_during_a_run_and_as_many_as_before_afterwards
 
 
 def test_worker_processes_give_the_same_lines(run, write_cloud, track, tmp_path, new_feedback, monkeypatch):
-    monkeypatch.setattr(runner, "WORTH_S", 0.0)
+    monkeypatch.setattr(processes, "WORTH_S", 0.0)
     tiles = tmp_path / "täg les"
     tiles.mkdir()
     for number in range(3):

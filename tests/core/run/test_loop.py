@@ -7,8 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rail_extract.core.errors import Cancelled
 from rail_extract.core.progress import Progress
+from rail_extract.core.run.loop import Runner
+from rail_extract.core.run.tasks import Once, Task
 from rail_extract.core.squares.grid import around
-from rail_extract.core.tasks import InTurn, Once, Task
 
 keys = st.sets(st.tuples(st.integers(-3, 3), st.integers(-3, 3)), min_size=1)
 
@@ -66,7 +67,7 @@ def test_every_square_is_drawn_once_as_soon_as_its_neighbours_are_clean(squares)
         assert len(alive) == len(set(cleaned) & (needed | neighbours))
         return key
 
-    found = list(InTurn().run(square_tasks(squares, clean, draw)))
+    found = list(Runner().run(square_tasks(squares, clean, draw)))
     assert cleaned == sorted(squares)
     assert found == [(("draw", key), key) for key in drawn]
     assert sorted(drawn) == sorted(squares)
@@ -79,7 +80,7 @@ def test_the_progress_follows_the_weights():
 
     listener = Listener()
     tasks = {number: Task("", half, (number,), weight=weight) for number, weight in enumerate((1, 6, 3))}
-    list(InTurn().run(tasks, listener))
+    list(Runner().run(tasks, listener))
     assert listener.fractions == pytest.approx([0.05, 0.1, 0.4, 0.7, 0.85, 1.0])
 
 
@@ -87,7 +88,7 @@ def test_a_cancel_is_noticed_between_tasks():
     ran = []
     tasks = {number: Task("", lambda one, context: ran.append(one), (number,)) for number in range(4)}
     with pytest.raises(Cancelled):
-        list(InTurn().run(tasks, Listener(cancel_at=0.5)))
+        list(Runner().run(tasks, Listener(cancel_at=0.5)))
     assert ran == [0, 1]
 
 
@@ -110,5 +111,5 @@ def test_the_start_of_a_network_is_said_once():
     listener = Listener()
     tasks = {key: Task("", clean, (key,)) for key in ("aa", "bbb")}
     tasks["again"] = Task("", clean, ("bbb",))
-    assert dict(InTurn().run(tasks, listener)) == {"aa": 2, "bbb": 3, "again": 3}
+    assert dict(Runner().run(tasks, listener)) == {"aa": 2, "bbb": 3, "again": 3}
     assert listener.texts == 2 * ["Starting the network", "The network has started"]

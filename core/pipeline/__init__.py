@@ -1,7 +1,7 @@
-"""The one walk from classified points to 3D rails and track centerlines, in the order of the paper's abstract.
+"""The one walk from rail points to 3D rails and track centerlines, in the order of the paper's abstract.
 
-`extract_rails` and `extract_files` divide the work into tasks and hand them to a runner, which executes them one after
-another in this process or on many machines (see `tasks`). The lines do not depend on the runner.
+It divides the work into tasks for a runner, which executes them one after another in this process or on many machines
+(see `run.loop`). The lines do not depend on the runner.
 """
 
 from __future__ import annotations
@@ -12,38 +12,31 @@ from pathlib import Path
 
 import numpy as np
 
-from .checks.doubts import doubting_jumps, doubting_scatter, gauge_scatter, strip_courses, warn_of_strips
-from .checks.lines import warn_of_rails, warn_of_split_classes, with_tracks
-from .checks.standard import head_widths, warn_of_gauge, warn_of_spacing
-from .classify.settings import Settings
-from .clouds.las import CloudHeader
-from .clouds.points import RailPoints, Request, read_each
-from .errors import CloudError, NoRailPointsError, NoTrackError, RailExtractError
-from .frpdf.models import choose
-from .grow.settings import GrowSettings
-from .heads.strips import rows_of
-from .labelling.spooling import spool_found, spool_grown
-from .parameters import ALIGNED, Parameters
-from .progress import SILENT, Progress, Recording, counted
-from .rails import Centerline, RailLine, RailNetwork, TrackGeometry
-from .raster import RailRaster
-from .scratch import scratch_folder
-from .squares.density import occupied_squares, plausible, warn_of_airborne, warn_of_unexplained
-from .squares.grid import Key, MemorySource, PointSource, Square, around, assembled
-from .squares.pieces import SquareRails, rows_in_frame
-from .squares.remeasuring import measure_rails
-from .squares.spool import SpooledFile, SpooledPoints, gather, spool_file
-from .squares.steps import clean_square, engine_for, rails_of_square, square_side, whole_rails
-from .tasks import Context, InTurn, Runner, Task
-from .tracks.centerlines import tracks_of
-from .tracks.geometry import measure_track_geometry
-from .tracks.parallels import widths_by_gauge
+from .. import checks
+from ..checks.doubts import doubting_scatter, strip_courses
+from ..checks.standard import warn_of_spacing
+from ..clouds.points import RailPoints
+from ..errors import NoRailPointsError, NoTrackError, RailExtractError
+from ..frpdf.models import choose
+from ..heads.strips import rows_of
+from ..parameters import ALIGNED, Parameters
+from ..progress import SILENT, Progress, Recording, counted
+from ..rails import Centerline, RailLine, RailNetwork, TrackGeometry
+from ..raster import RailRaster
+from ..run.loop import Runner
+from ..run.tasks import Context, Task
+from ..squares.density import occupied_squares, plausible
+from ..squares.grid import Key, MemorySource, PointSource, SortedPoints, Square, around, assembled
+from ..squares.pieces import SquareRails, rows_in_frame
+from ..squares.remeasuring import measure_rails
+from ..squares.steps import clean_square, engine_for, rails_of_square, square_side, whole_rails
+from ..tracks.centerlines import tracks_of
+from ..tracks.geometry import measure_track_geometry
+from ..tracks.parallels import widths_by_gauge
+from .sources import Source
 
-READING, DRAWING, PAIRING, MEASURING = 0.2, 0.72, 0.04, 0.04
-"""Run times of the steps relative to each other, for the progress: sorting files, squares, tracks, track geometry."""
-
-FINDING = 4.0
-"""Run time, relative to these, of finding the rail points of a raw cloud, which has 10 to 100 times as many points."""
+DRAWING, PAIRING, MEASURING = 0.72, 0.04, 0.04
+"""Run times of the steps relative to each other, for the progress: squares, tracks, track geometry."""
 
 CLEAN_S, DRAW_S = 1.5e-5, 2.5e-5
 """Run times per point, in seconds, of the two tasks of a square: cleaning its raster with the network, and drawing its
@@ -95,39 +88,24 @@ def extract_rails(
         raise NoRailPointsError("There is no point to extract rails from.")
     side_m = square_side(parameters)
     sources = [MemorySource(one, side_m) if isinstance(one, RailPoints) else one for one in points]
-    return _walk(sources, parameters, InTurn(), progress)
+    return _walk(SortedPoints(sources), parameters, Runner(), progress)
 
 
 def extract_files(
-    request: Request,
-    folder: Path,
-    parameters: Parameters,
-    runner: Runner,
-    progress: Progress = SILENT,
-    classify: bool = False,
-    weights: Path | None = None,
-    seeds: Sequence[np.ndarray] = (),
+    source: Source, folder: Path, parameters: Parameters, runner: Runner, progress: Progress = SILENT
 ) -> RailNetwork:
     """Extract rails and centerlines from files of points, however large, with any runner.
 
     Parameters
     ----------
-    request : Request
-        Files, classes and extent, from `points.ask`.
+    source : Source
+        `sources.Classified`, `Raw` or `Grown`, made from a request of `points.ask`.
     folder : Path
         Existing folder for the points of the squares, 24 bytes each. The caller removes it.
     parameters : Parameters
     runner : Runner
         Whether errors of single files and squares end the run is for the runner to decide.
     progress : Progress
-    classify : bool
-        Whether the cloud is a raw one, whose rail points are to be found first; the request is for the classes
-        `standards.SEARCHED_CLASSES` then.
-    weights : Path, optional
-        Weights of the network that finds them; None means geometry.
-    seeds : sequence of (k, 2) array
-        Places on railheads, k = 1, or lines along them, in units of the CRS, if only the rails that grow from these
-        are to be extracted; the request is for the same classes.
 
     Raises
     ------
@@ -142,115 +120,47 @@ def extract_files(
     RailExtractError
         Every square failed.
     """
-    side_m = square_side(parameters)
-    progress = recording = Recording(progress)
-    first = FINDING if classify or len(seeds) else READING
-    reading, rest = progress.divide((first, DRAWING + PAIRING + MEASURING))
-    if classify or len(seeds):
-        with scratch_folder(folder) as scratch:
-            if classify:
-                settings = Settings(parameters.gauges_m, parameters.head_width_m, weights=weights)
-                source, figures = spool_found(request, settings, side_m, scratch, runner, reading)
-            else:
-                own = GrowSettings(parameters.gauge_m, parameters.head_width_m)
-                source, figures = spool_grown(request, seeds, own, side_m, scratch, reading)
-            network = _walk([source], parameters, runner, rest, raw=True)
-        if classify and network.heads is not None and network.heads.blunt:
-            # Only its partner tells a blunt rail from other ridges, and the user has been told so.
-            network = replace(network, rails=tuple(rail for rail in network.rails if rail.track_ids))
-        return replace(network, warnings=recording.warnings, search=figures)
-    is_warned = warn_of_gauge(request, parameters, progress)
-    request.announce(progress)
-    network = _walk(_sorted_points(request, side_m, folder, runner, reading), parameters, runner, rest, is_warned)
-    return replace(network, warnings=recording.warnings)
+    recording = Recording(progress)
+    sorting, walking = recording.divide((source.run_time, DRAWING + PAIRING + MEASURING))
+    with source.sort(folder, parameters, runner, sorting) as points:
+        return replace(_walk(points, parameters, runner, walking), warnings=recording.warnings)
 
 
-def _sorted_points(
-    request: Request, side_m: float, folder: Path, runner: Runner, progress: Progress
-) -> tuple[SpooledPoints, ...]:
-    """Sort the points of all files into squares, one file per task."""
-    arguments = [(side_m, folder)] * len(request.headers)
-    return gather(request, side_m, read_each(request, _sort_file, arguments, runner, progress))
-
-
-def _sort_file(request: Request, header: CloudHeader, side_m: float, folder: Path, context: Context) -> SpooledFile:
-    """Sort the points of one file; a task."""
-    try:
-        return spool_file(request, header, side_m, folder, context.progress)
-    except OSError as error:
-        raise CloudError(
-            f"{header.path.name} can't be read ({error.strerror}): check the disk or the network drive."
-        ) from error
-
-
-def _walk(
-    sources: Sequence[PointSource],
-    parameters: Parameters,
-    runner: Runner,
-    progress: Progress,
-    is_warned: bool = False,
-    raw: bool = False,
-) -> RailNetwork:
-    """Extract rails, centerlines and track geometry from points that are sorted into squares.
-
-    If the user `is_warned` of another gauge, the rails do not lead to the same question again. The points may be those
-    that were found in a `raw` cloud.
-    """
+def _walk(points: SortedPoints, parameters: Parameters, runner: Runner, progress: Progress) -> RailNetwork:
+    """Extract rails, centerlines and track geometry from points that are sorted into squares."""
     progress = Recording(progress)
     drawing, pairing, measuring = progress.divide((DRAWING, PAIRING, MEASURING))
-    progress.status("Drawing the rails")
-    sources = plausible(sources, progress)
-    rails, strips, cleaned, sources = _draw_rails(sources, parameters, runner, drawing, raw)
-    centerlines = _pair_rails(rails, sources, parameters, runner, pairing, is_warned)
-    progress.info(f"Paired: {_lengths(centerlines, 'track')}.")
-    rails = with_tracks(rails, centerlines, progress)
-    warn_of_split_classes(rails, parameters, progress)
-    warn_of_strips(rails, parameters, progress)
-    rails = doubting_jumps(rails, centerlines, progress)
-    heads = head_widths(sources[0], parameters.gauges, progress, rails) if rails else None
-    beyond_m = gauge_scatter(rails, centerlines, parameters.gauges_m) if heads and heads.blunt else {}
-    rails = doubting_scatter(rails, beyond_m)
-    geometry = _measure_tracks(centerlines, rails, beyond_m, sources, parameters, runner, measuring)
-    described = dict(runner.run({"engine": Task("Describing the engine", _describe_engine, (parameters,))}))
-    progress.info(f"Engine of the network: {described.get('engine', 'unknown')}.")
+    points = replace(points, classes=plausible(points.classes, progress))
+    network, strips, points = _drawn(points, parameters, runner, drawing)
+    network = _paired(network, points, parameters, runner, pairing)
+    network, beyond_m = checks.of(network, points, parameters, progress)
+    network = _measured(network, beyond_m, points, parameters, runner, measuring)
     progress.set_fraction(1.0)
-    return RailNetwork(
-        tuple(rails),
-        tuple(centerlines),
-        sources[0].frame,
-        described.get("engine", ""),
-        tuple(geometry),
-        tuple(cleaned.values()),
-        tuple(cleaned),
-        tuple(runner.failures),
-        progress.warnings,
-        heads,
-        strip_courses(centerlines, strips),
+    return replace(
+        network,
+        engine=_engine(parameters, runner, progress),
+        failures=tuple(runner.failures),
+        warnings=progress.warnings,
+        strips=strip_courses(network.centerlines, strips),
+        search=points.search,
     )
 
 
-def _draw_rails(
-    sources: Sequence[PointSource], parameters: Parameters, runner: Runner, progress: Progress, raw: bool
-) -> tuple[list[RailLine], np.ndarray, dict[int, RailRaster], list[PointSource]]:
+def _drawn(
+    points: SortedPoints, parameters: Parameters, runner: Runner, progress: Progress
+) -> tuple[RailNetwork, np.ndarray, SortedPoints]:
     """Draw the rails of all classes.
 
-    Returns
-    -------
-    rails : list of RailLine
-    strips : array
-        Offsets of the strips in the frame of the cloud, see `squares.pieces.rows_in_frame`.
-    cleaned : dict of int to RailRaster
-        Cleaned rasters by class, if they are to be kept.
-    sources : list of PointSource
-        Those of points that know whether their cloud blunts heads.
+    Also returns the rows of `pieces.rows_in_frame` that show strips, (k, 7), and points that know how blunt they are.
     """
+    progress.status("Drawing the rails")
     rails: list[RailLine] = []
     strips: list[np.ndarray] = []
     cleaned: dict[int, RailRaster] = {}
     judged: list[PointSource] = []
     any_square = False
-    for source, share in zip(sources, progress.split(len(sources))):
-        squares = {square.key: square for square in occupied_squares(sources, source)}
+    for source, share in zip(points.classes, progress.split(len(points.classes))):
+        squares = {square.key: square for square in occupied_squares(points.classes, source)}
         _announce_squares(source, squares, parameters, share)
         parts, rasters = _draw_squares(source, squares, parameters, runner, share)
         parts, source = _drawn_alike(parts, source, squares, parameters, runner, share)
@@ -259,34 +169,29 @@ def _draw_rails(
         strips += [rows_in_frame(part, source.frame) for part in parts]
         found = whole_rails(_released(parts), source.frame, parameters, len(rails) + 1, share) if parts else []
         share.info(f"Class {source.class_code}: {_lengths(found, 'rail')}.")
-        warn_of_rails(found, source.class_code, parameters, share, raw)
-        if found:
-            warn_of_unexplained(source, found, share)
-            warn_of_airborne(source, found, share)
         rails += found
         if rasters:
             cleaned[source.class_code] = assembled(rasters, squares, source.frame)
     if not any_square:
         raise RailExtractError(f"Not one square could be extracted; the last error was: {runner.failures[-1]}")
-    return rails, np.concatenate(strips or [rows_of((), ())]), cleaned, judged
+    frame = points.classes[0].frame
+    network = RailNetwork(tuple(rails), (), frame, cleaned=tuple(cleaned.values()), cleaned_classes=tuple(cleaned))
+    return network, np.concatenate(strips or [rows_of((), ())]), replace(points, classes=judged)
 
 
-def _pair_rails(
-    rails: Sequence[RailLine],
-    sources: Sequence[PointSource],
-    parameters: Parameters,
-    runner: Runner,
-    progress: Progress,
-    is_warned: bool,
-) -> list[Centerline]:
+def _paired(
+    network: RailNetwork, points: SortedPoints, parameters: Parameters, runner: Runner, progress: Progress
+) -> RailNetwork:
     """Draw the centerlines; without any track, what the points show of the gauge is a failure of the run."""
+    centerlines: Sequence[Centerline] = ()
     try:
-        return tracks_of(rails, parameters, progress)
+        centerlines = tracks_of(network.rails, parameters, progress)
     except NoTrackError as error:
         told = f"No track of {1000 * parameters.gauge_m:.0f} mm gauge found."
-        is_asked = is_warned or warn_of_spacing(sources[0], parameters, progress)
+        is_asked = points.is_warned or warn_of_spacing(points.classes[0], parameters, progress)
         runner.failures.append(told if is_asked else str(error))
-        return []
+    progress.info(f"Paired: {_lengths(centerlines, 'track')}.")
+    return replace(network, centerlines=tuple(centerlines))
 
 
 def _released(parts: list[SquareRails]) -> Iterator[SquareRails]:
@@ -320,13 +225,7 @@ def _draw_squares(
 ) -> tuple[list[SquareRails], dict[Key, RailRaster]]:
     """Clean the raster of every square of a class, and draw the lines of each square once its neighbours are clean.
 
-    Given `drawn`, only the lines of these squares are drawn.
-
-    Returns
-    -------
-    parts : list of SquareRails
-    rasters : dict of Key to RailRaster
-        Cleaned rasters, if they are to be kept.
+    Given `drawn`, only the lines of these squares are drawn. Returns the lines, and cleaned rasters if they are kept.
     """
     parts: list[SquareRails] = []
     rasters: dict[Key, RailRaster] = {}
@@ -409,32 +308,38 @@ def _draw(source: PointSource, square: Square, parameters: Parameters, context: 
     return rails_of_square(source, square, rasters, parameters, context.progress)
 
 
+def _engine(parameters: Parameters, runner: Runner, progress: Progress) -> str:
+    """Name the engine and the device that ran the network."""
+    described = dict(runner.run({"engine": Task("Describing the engine", _describe_engine, (parameters,))}))
+    progress.info(f"Engine of the network: {described.get('engine', 'unknown')}.")
+    return described.get("engine", "")
+
+
 def _describe_engine(parameters: Parameters, context: Context) -> str:
     """Name the engine and the device; a task."""
     return context.once(engine_for, parameters).description
 
 
-def _measure_tracks(
-    centerlines: Sequence[Centerline],
-    rails: Sequence[RailLine],
+def _measured(
+    network: RailNetwork,
     beyond_m: Mapping[int, float],
-    sources: Sequence[PointSource],
+    points: SortedPoints,
     parameters: Parameters,
     runner: Runner,
     progress: Progress,
-) -> list[TrackGeometry]:
+) -> RailNetwork:
     """Measure the geometry of all tracks, class by class, if it is asked for; see `gauge_scatter` for `beyond_m`."""
     if parameters.quality_step_m is None:
-        return []
+        return network
     remeasuring, stations = progress.divide((REMEASURE, STATIONS))
     align = parameters.strips == ALIGNED
-    heads_m = widths_by_gauge(rails, parameters.gauges, parameters.centerline_tolerance_m)
-    measured = measure_rails(rails, sources, heads_m, runner, remeasuring, align)
+    heads_m = widths_by_gauge(network.rails, parameters.gauges, parameters.centerline_tolerance_m)
+    measured = measure_rails(network.rails, points.classes, heads_m, runner, remeasuring, align)
     measured = doubting_scatter(measured, beyond_m)
     geometry: list[TrackGeometry] = []
-    for source, share in zip(sources, stations.split(len(sources))):
+    for source, share in zip(points.classes, stations.split(len(points.classes))):
         geometry += measure_track_geometry(
-            [line for line in centerlines if line.class_code == source.class_code],
+            [line for line in network.centerlines if line.class_code == source.class_code],
             [rail for rail in measured if rail.class_code == source.class_code],
             parameters.head_width_m,
             parameters.quality_step_m,
@@ -444,4 +349,4 @@ def _measure_tracks(
     if geometry:
         count = sum(len(track.chainage_m) for track in geometry)
         progress.info(f"Measured: {counted(count, 'station')}, one every {parameters.quality_step_m:g} m.")
-    return sorted(geometry, key=lambda one: one.track_id)
+    return replace(network, geometry=tuple(sorted(geometry, key=lambda one: one.track_id)))

@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rail_extract.core.cluster.store import DamagedError, Stored, can_store, fingerprint, load, save
 from rail_extract.core.errors import DiskError
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.parameters import Parameters
 from rail_extract.core.rails import RailLine, Support
 from rail_extract.core.raster import rasterize
 from rail_extract.core.squares.grid import Square
+from rail_extract.core.squares.kept import DamagedError, Stored, can_store, fingerprint, load, save
 from rail_extract.core.squares.pieces import SquareRails
 from rail_extract.core.squares.spool import SpooledPoints
 

@@ -1,4 +1,4 @@
-"""Results of tasks in files whose names change with everything that the results depend on.
+"""Results of squares in files whose names change with everything that the results depend on.
 
 A file is complete or does not exist: after any interruption, the next run continues with the finished results.
 """
@@ -10,7 +10,7 @@ import json
 import math
 import os
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import lru_cache
 from io import BytesIO
 from pathlib import Path
@@ -19,16 +19,16 @@ from typing import Any
 import numpy as np
 
 from ..disk import writing
+from ..errors import RailExtractError
 from ..frame import LocalFrame
-from ..frpdf.models import MODELS
 from ..rails import RailLine, Support
 from ..raster import RailRaster
-from ..scratch import scratch_folder
-from ..squares.grid import Square
-from ..squares.pieces import SquareRails
-from ..squares.spool import SpooledPoints
-
-CORE = Path(__file__).resolve().parent.parent
+from ..run.tasks import Context, Task
+from ..run.version import version
+from ..scratch import discard, scratch_folder, sweep
+from .grid import Square
+from .pieces import SquareRails
+from .spool import SpooledPoints
 
 KEPT = {one.__name__: one for one in (RailRaster, SquareRails, Square, LocalFrame, RailLine, Support)}
 """Classes of which results consist, besides numbers, texts, arrays, tuples and mappings."""
@@ -41,11 +41,48 @@ class Stored:
     path: str
 
 
+class KeptResults:
+    """Keeps results in a folder, which every process that executes tasks must reach under the same path."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder.resolve()
+        with writing(self._folder):
+            self._folder.mkdir(parents=True, exist_ok=True)  # not by workers: a failed run may have removed it
+
+    def kept(self, task: Task) -> Task:
+        """See `run.loop.Keeping`."""
+        return replace(task, function=_kept, arguments=(task, str(self._folder)))
+
+    def opened(self, result: Any) -> Any:
+        """See `run.loop.Keeping`."""
+        return load(result) if isinstance(result, Stored) else result
+
+
+def _kept(task: Task, folder: str, context: Context) -> Any:
+    """Return the file of a result that is there and intact; otherwise compute it, and keep it if `save` can."""
+    _sweep_once(folder)
+    name = task.function.__name__.strip("_")
+    path = Path(folder) / f"{name}_{fingerprint(name, *task.arguments, context.results, version())}.npz"
+    if os.path.lexists(path):
+        try:
+            load(Stored(str(path)))
+            return Stored(str(path))
+        except DamagedError:
+            context.progress.warning(f"{task.label}: the stored result is damaged, so it is computed again.")
+            with writing(path.parent):
+                discard(path)
+    results = {one: load(given) if isinstance(given, Stored) else given for one, given in context.results.items()}
+    result = task.function(*task.arguments, replace(context, results=results))
+    if not can_store(result):
+        return result
+    save(path, result)
+    return Stored(str(path))
+
+
 @lru_cache
-def version() -> str:
-    """Fingerprint of the code and of all weights: results of another version are not used."""
-    files = [*sorted(CORE.rglob("*.py")), *(model.path for model in MODELS)]
-    return fingerprint(*(file.read_bytes() for file in files))
+def _sweep_once(folder: str) -> None:
+    """Remove what killed processes of this computer have left in a folder."""
+    sweep(Path(folder))
 
 
 def fingerprint(*facts: Any) -> str:
@@ -109,7 +146,7 @@ def save(path: Path, result: RailRaster | SquareRails | tuple[RailLine, ...]) ->
         unfinished.replace(path)
 
 
-class DamagedError(Exception):
+class DamagedError(RailExtractError):
     """A file does not hold what `save` wrote."""
 
 
@@ -124,7 +161,7 @@ def load(stored: Stored) -> Any:
         with np.load(stored.path, allow_pickle=False) as file:
             return _restored(json.loads(file["text"].tobytes()), BytesIO(file["arrays"].tobytes()))
     except Exception as error:  # damage shows as an error of the file, of the compression or of the arrays
-        raise DamagedError(f"{Path(stored.path).name} is damaged ({error})") from error
+        raise DamagedError(f"{Path(stored.path).name} is damaged ({error}): start the run again") from error
 
 
 def _bytes(content: bytes) -> np.ndarray:

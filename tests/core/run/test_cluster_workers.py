@@ -10,8 +10,8 @@ import pytest
 from distributed import Client, LocalCluster
 from distributed.comm.addressing import parse_host_port
 from distributed.security import Security
-from rail_extract.core.cluster.workers import Certificates, connect
 from rail_extract.core.errors import ParameterError, RailExtractError
+from rail_extract.core.run.cluster import Certificates, running, started
 
 
 def listening():
@@ -55,7 +55,7 @@ def others():
 
 
 def test_local_workers_accept_only_their_own_certificate(others):
-    with connect(None, 1) as client:
+    with started(1) as client:
         address = client.scheduler.address
         assert address.startswith("tls://127.0.0.1:")
         found = listening() - others
@@ -88,12 +88,8 @@ def pages(ports):
     return found
 
 
-def test_there_is_no_dashboard_unless_asked_for(others):
-    with connect(None, 1):
-        found = listening() - others
-        assert {host for host, _ in found} == {"127.0.0.1"}
-        assert pages(port for _, port in found) == set()
-    with connect(None, 1, dashboard_port=0) as client:
+def test_the_dashboard_is_for_this_computer_only(others):
+    with started(1) as client:
         port = client.scheduler_info()["services"]["dashboard"]
         assert ("127.0.0.1", port) in listening()
         assert {host for host, _ in listening() - others} == {"127.0.0.1"}
@@ -103,7 +99,7 @@ def test_there_is_no_dashboard_unless_asked_for(others):
 def test_a_scheduler_with_certificates(client, scheduler):
     files = dict(zip(scheduler[2::2], scheduler[3::2]))
     certificates = Certificates(files["--tls-ca"], files["--tls-cert"], files["--tls-key"])
-    with connect(client.scheduler.address, certificates=certificates) as other:
+    with running(client.scheduler.address, certificates) as other:
         assert other.submit(os.getpid).result() != os.getpid()
 
 
@@ -112,28 +108,28 @@ def test_wrong_certificates_are_refused(client, scheduler, tmp_path, monkeypatch
     for file in files:
         file.write_text("not a certificate")
     with pytest.raises(ParameterError, match=r"The certificates \(.*ca, .*cert, .*key\) can't be used"):
-        next(connect(client.scheduler.address, certificates=Certificates(*files)).gen)
+        next(running(client.scheduler.address, Certificates(*files)).gen)
     security = Security.temporary()
     for file, text in zip(files, (security.tls_ca_file, security.tls_client_cert, security.tls_client_key)):
         file.write_text(text)
-    monkeypatch.setattr("rail_extract.core.cluster.workers.TIMEOUT_S", 3)
+    monkeypatch.setattr("rail_extract.core.run.cluster.TIMEOUT_S", 3)
     with pytest.raises(RailExtractError, match="check the address and the certificates"):
-        next(connect(client.scheduler.address, certificates=Certificates(*files)).gen)
+        next(running(client.scheduler.address, Certificates(*files)).gen)
 
 
 def test_a_scheduler_without_workers_is_named(monkeypatch):
-    monkeypatch.setattr("rail_extract.core.cluster.workers.TIMEOUT_S", 1)
+    monkeypatch.setattr("rail_extract.core.run.cluster.TIMEOUT_S", 1)
     sentence = r"^The Dask scheduler at tcp://.* has no workers: start some"
     with (
         LocalCluster(n_workers=0, host="127.0.0.1", dashboard_address=None) as cluster,
         pytest.raises(RailExtractError, match=sentence),
     ):
-        next(connect(cluster.scheduler_address).gen)
+        next(running(cluster.scheduler_address).gen)
 
 
 def test_nothing_is_left_in_the_temporary_folder(tmp_path, monkeypatch):
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    with connect(None, 1) as client:
+    with started(1) as client:
         client.submit(os.getpid).result()
         assert len(list(tmp_path.iterdir())) == 1
     assert list(tmp_path.iterdir()) == []

@@ -1,6 +1,7 @@
 """The walk: several gauges in one run, lines with and without points, and squares compared with an undivided run."""
 
-from dataclasses import replace
+from contextlib import nullcontext
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -14,11 +15,11 @@ from rail_extract.core.polyline import length_along, project
 from rail_extract.core.progress import Progress
 from rail_extract.core.rails import RailLine, SearchFigures
 from rail_extract.core.raster import cell_size, rasterize
+from rail_extract.core.run.loop import Runner
 from rail_extract.core.squares import steps
-from rail_extract.core.squares.grid import MemorySource
+from rail_extract.core.squares.grid import MemorySource, SortedPoints
 from rail_extract.core.squares.steps import lines_of
 from rail_extract.core.standards import STANDARDS, RailStandard
-from rail_extract.core.tasks import InTurn
 from rail_extract.core.tracks.centerlines import tracks_of
 from rail_extract.laboratory.curves import Element, trace, transition_curve
 from rail_extract.laboratory.scenes.plain import straight
@@ -240,17 +241,25 @@ def ridges(rng, *lefts, wander_m=0.0):
     return np.column_stack([t, across, rng.normal(0, 0.01, len(t)) - 5 * left**2])
 
 
+@dataclass(frozen=True)
+class Given:
+    """A source whose points are there."""
+
+    points: SortedPoints
+    run_time = 1.0
+
+    def sort(self, *_):
+        return nullcontext(self.points)
+
+
 @pytest.mark.parametrize("classify", [True, False])
 def test_a_blunt_ridge_without_a_partner_is_a_rail_only_if_someone_says_so(monkeypatch, tmp_path, classify):
     monkeypatch.setattr(steps, "clean", lambda raster, *_: raster)
     half = 0.5 * (1.435 + WIDTH)
     xyz = ridges(np.random.RandomState(6), half, -half, 6.0)
     source = MemorySource(RailPoints(xyz, LocalFrame(np.zeros(3)), 10), 500.0)
-    found = lambda *_: (source, SearchFigures(blunt_m=300.0))  # noqa: E731
-    monkeypatch.setattr(pipeline, "spool_found", found)
-    monkeypatch.setattr(pipeline, "spool_grown", found)
-    seeds = () if classify else (xyz[:1, :2],)
-    network = extract_files(None, tmp_path, Parameters(1.435, WIDTH), InTurn(), classify=classify, seeds=seeds)
+    points = SortedPoints([source], SearchFigures(blunt_m=300.0), only_pairs=classify)
+    network = extract_files(Given(points), tmp_path, Parameters(1.435, WIDTH), Runner())
     assert len(network.rails) == (2 if classify else 3)
     assert len(network.centerlines) == 1
 

@@ -20,8 +20,8 @@ from queue import SimpleQueue
 from typing import Any, Callable
 
 from ..kernels import ENVIRONMENT
-from ..progress import Progress
-from ..tasks import Context, Once, Task
+from .loop import Answer, Heard
+from .tasks import Context, Once, Task
 
 PROGRAM = "import sys; sys.path[:] = sys.argv[1:]; from {} import serve; serve()"
 """Looks for modules where this process does: the current folder, which is the first place otherwise, may hold any."""
@@ -65,15 +65,9 @@ Messages = SimpleQueue
 
 
 class Worker:
-    """A process that executes one task after another.
+    """A process that executes one task after another, and puts (worker, kind, content) for each message into a queue.
 
     It ends with this one, however that ends: its input ends then.
-
-    Parameters
-    ----------
-    interpreter : Interpreter
-    messages : SimpleQueue
-        Receives (worker, kind, content) for each message, from a thread of its own.
     """
 
     def __init__(self, interpreter: Interpreter, messages: Messages) -> None:
@@ -118,25 +112,6 @@ class Worker:
             messages.put((self, Kind.ENDED, None))
 
 
-@dataclass(frozen=True)
-class Answer:
-    """What comes of a task.
-
-    Attributes
-    ----------
-    result : bytes
-        The result, pickled; not to be read if there is an error.
-    error : BaseException or None
-        What the task raised.
-    said : tuple of (str, str)
-        Name of a method of `Progress`, and the text with which the task called it.
-    """
-
-    result: bytes
-    error: BaseException | None
-    said: tuple[tuple[str, str], ...]
-
-
 def serve() -> None:
     """Execute tasks until the input ends, as it does when the process that started this one ends in any way."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal sends Ctrl-C to all; the parent process ends its workers
@@ -165,31 +140,22 @@ def _receive(tasks: SimpleQueue[bytes]) -> None:
 
 
 def answer(content: bytes, once: Once, send: Send) -> Answer:
-    """Execute what `Worker.send` has sent; errors of every kind are for the parent process to raise."""
-    heard = _Heard(send)
-    try:
+    """Execute what `Worker.send` has sent."""
+    heard = _Reported(send)
+
+    def compute() -> bytes:
         task, inputs = pickle.loads(content)  # nosec B301
         results = {name: pickle.loads(one) for name, one in inputs.items()}  # nosec B301
-        result = task.function(*task.arguments, Context(results, once, heard))
-        return Answer(pickle.dumps(result, pickle.HIGHEST_PROTOCOL), None, tuple(heard.said))
-    except BaseException as error:  # lazrs raises one on damaged files that is not an `Exception`
-        return Answer(b"", _sendable(error), tuple(heard.said))
+        return pickle.dumps(task.function(*task.arguments, Context(results, once, heard)), pickle.HIGHEST_PROTOCOL)
+
+    return heard.answer(compute)
 
 
-def _sendable(error: BaseException) -> BaseException:
-    """Return an error, or one that says the same if it can't be pickled or made again."""
-    try:
-        pickle.loads(pickle.dumps(error))  # nosec B301
-        return error
-    except Exception:
-        return RuntimeError(f"{type(error).__name__}: {error}")
-
-
-class _Heard(Progress):
-    """Sends how far a task is, and keeps what it says for the log."""
+class _Reported(Heard):
+    """Sends how far a task is, too."""
 
     def __init__(self, send: Send) -> None:
-        self.said: list[tuple[str, str]] = []
+        super().__init__()
         self._send, self._sent = send, time.monotonic()
 
     def set_fraction(self, fraction: float) -> None:
@@ -200,12 +166,3 @@ class _Heard(Progress):
 
     def status(self, text: str) -> None:
         self._send(Kind.STATUS, text)
-
-    def info(self, text: str) -> None:
-        self.said.append(("info", text))
-
-    def warning(self, text: str) -> None:
-        self.said.append(("warning", text))
-
-    def propose(self, standard: str) -> None:
-        self.said.append(("propose", standard))

@@ -2,41 +2,42 @@
 
 import numpy as np
 import pytest
-from rail_extract.core.classify.settings import Settings
 from rail_extract.core.clouds.las import laspy
 from rail_extract.core.clouds.points import ask
 from rail_extract.core.errors import NoRailPointsError, RailExtractError
-from rail_extract.core.labelling.spooling import spool_found
+from rail_extract.core.parameters import Parameters
+from rail_extract.core.pipeline.sources import Raw
 from rail_extract.core.progress import SILENT
+from rail_extract.core.run.loop import Answer, InTurn, Runner
 from rail_extract.core.standards import SEARCHED_CLASSES
-from rail_extract.core.tasks import InTurn
+
+PARAMETERS = Parameters(1.435, 0.072)
 
 
 class Failing(InTurn):
     """Searches no square."""
 
-    def run(self, tasks, progress=SILENT):
-        for name, result in super().run(tasks, progress):
-            if tasks[name].label.startswith("Searching"):
-                self.failures.append(f"{tasks[name].label} failed (reason).")
-            else:
-                yield name, result
+    def wait(self, progress, advance):
+        is_search = self._started[0][1].label.startswith("Searching")
+        name, answer = super().wait(progress, advance)
+        return name, Answer(error=ValueError("reason")) if is_search else answer
 
 
 @pytest.mark.parametrize(
-    ("runner", "kind", "words"),
+    ("executor", "kind", "words"),
     [
         (InTurn, NoRailPointsError, "No rail was found in the raw cloud: check the rail standard"),
         (Failing, RailExtractError, r"No rail was found, and a part .* the last error was: Searching .* failed"),
     ],
 )
-def test_a_cloud_that_could_not_be_searched_is_not_called_empty(tmp_path, runner, kind, words):
+def test_a_cloud_that_could_not_be_searched_is_not_called_empty(tmp_path, executor, kind, words):
     cloud = laspy.LasData(laspy.LasHeader(point_format=6, version="1.4"))
     rng = np.random.RandomState(1)
     cloud.x, cloud.y, cloud.z = rng.uniform(0, 5, (3, 2000)) * [[1], [1], [0.01]]
     cloud.write(tmp_path / "raw.las")
     request = ask([tmp_path / "raw.las"], SEARCHED_CLASSES, None, None, SILENT)
-    (tmp_path / "squares").mkdir()
-    with pytest.raises(kind, match=words) as error:
-        spool_found(request, Settings((1.435,), 0.072), 40.0, tmp_path / "squares", runner(), SILENT)
+    runner = Runner(executor(), tolerant=True)
+    with pytest.raises(kind, match=words) as error, Raw(request).sort(tmp_path, PARAMETERS, runner, SILENT):
+        pass
+    assert [one.name for one in tmp_path.iterdir()] == ["raw.las"]
     assert (type(error.value) is NoRailPointsError) == (kind is NoRailPointsError)

@@ -15,11 +15,13 @@ from rail_extract.core.clouds.points import ask
 from rail_extract.core.errors import Cancelled, RailExtractError
 from rail_extract.core.kernels import blas, one_thread
 from rail_extract.core.pipeline import Parameters, extract_files
+from rail_extract.core.pipeline.sources import Classified
 from rail_extract.core.progress import Progress
-from rail_extract.core.tasks import InTurn, Task
-from rail_extract.core.workers import runner as runner_module
-from rail_extract.core.workers.process import Interpreter, Worker
-from rail_extract.core.workers.runner import Workers, worker_count, workers
+from rail_extract.core.run import processes as module
+from rail_extract.core.run.loop import Runner
+from rail_extract.core.run.processes import Processes, worker_count, workers
+from rail_extract.core.run.tasks import Task
+from rail_extract.core.run.worker import Interpreter, Worker
 
 FUNCTIONS = """
 import os, sys, threading, time
@@ -53,6 +55,13 @@ def fail_oddly(context):
 def die(context):
     os._exit(9)
 
+def die_first(file, deaths, context):
+    with open(file, "a") as stream:
+        stream.write(".")
+    if os.path.getsize(file) <= deaths:
+        os._exit(9)
+    return os.path.getsize(file)
+
 def leave(file, context):
     Path(file).write_text("")
 
@@ -71,8 +80,6 @@ def half(context):
     time.sleep(0.15)
     context.progress.set_fraction(0.5)
 """
-
-INTERPRETER = Interpreter(sys.executable)
 
 
 class Log(Progress):
@@ -102,7 +109,7 @@ def functions(tmp_path_factory):
     (folder / "functions_of_tasks.py").write_text(FUNCTIONS)
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(str(folder))
-        patch.setattr(runner_module, "WORTH_S", 0.0)
+        patch.setattr(module, "WORTH_S", 0.0)
         import functions_of_tasks
 
         yield functions_of_tasks
@@ -110,11 +117,17 @@ def functions(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def two(functions):
+def executor(functions):
+    """Two workers."""
+    executor = Processes(2, lambda: Interpreter(sys.executable))
+    yield executor
+    executor.end()
+
+
+@pytest.fixture
+def two(executor):
     """A runner with two workers."""
-    runner = Workers(2, lambda: INTERPRETER)
-    yield runner
-    runner.end()
+    return Runner(executor)
 
 
 def run(runner, tasks, log=None):
@@ -150,9 +163,9 @@ def graphs(draw):
     return [sorted(draw(st.sets(st.integers(0, number - 1), max_size=3))) if number else [] for number in range(count)]
 
 
-@settings(max_examples=20, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(graphs(), st.sets(st.integers(0, 11), max_size=2))
-def test_results_messages_and_errors_come_as_from_one_process(functions, two, graph, failing):
+@settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(graphs(), st.sets(st.integers(0, 11), max_size=2), st.booleans())
+def test_results_messages_and_errors_come_as_from_one_process(functions, executor, graph, failing, tolerant):
     tasks = {
         number: Task(f"task {number}", functions.add, (number,), needs=tuple(inputs), returned=number % 4 != 1)
         for number, inputs in enumerate(graph)
@@ -160,8 +173,11 @@ def test_results_messages_and_errors_come_as_from_one_process(functions, two, gr
     for number in failing & set(tasks):
         tasks[number] = replace(tasks[number], function=functions.fail, arguments=(number, 0.0))
     expected, found = Log(), Log()
-    assert run(two, tasks, found) == run(InTurn(), tasks, expected)
+    alone, two = Runner(tolerant=tolerant), Runner(executor, tolerant=tolerant)
+    assert run(two, tasks, found) == run(alone, tasks, expected)
     assert [one for one in found.said if "WORKERS" not in one[1]] == expected.said
+    assert two.failures == alone.failures
+    assert len(alone.failures) <= len(failing & set(tasks)) * tolerant
 
 
 def test_the_first_error_counts_even_if_a_later_one_comes_sooner(functions, two, tmp_path):
@@ -225,14 +241,42 @@ def test_a_worker_that_dies_is_named_by_its_task(functions, two):
     assert run(two, {number: Task("", functions.add, (number,)) for number in range(2)}) == ([(0, 0), (1, 1)], None)
 
 
+def test_a_task_whose_worker_ends_runs_again(functions, two, tmp_path):
+    tasks = {
+        number: Task(f"task {number}", functions.die_first, (str(tmp_path / f"{number}"), number))
+        for number in range(3)
+    }
+    log = Log()
+    assert run(two, tasks, log) == ([(0, 1), (1, 2), (2, 3)], None)
+    assert len([text for _, text in log.said if text.startswith("A worker process ended")]) == 3
+
+
+def test_a_worker_that_ends_while_it_waits_is_replaced(functions, executor):
+    tasks = {number: Task("", functions.about, (), weight=9) for number in range(2)}
+    numbers = [number for number, _ in dict(Runner(executor).run(tasks)).values()]
+    for number in set(numbers):
+        os.kill(number, signal.SIGTERM)
+    time.sleep(0.2)  # or it may be given a task before it ends, as one that ends later
+    later = [number for number, _ in dict(Runner(executor).run(tasks)).values()]
+    assert len(later) == 2 and not set(later) & set(numbers)
+
+
+def test_the_others_continue_if_a_task_ends_each_of_its_workers(functions, executor):
+    tasks = {1: Task("Cleaning square (0, 1)", functions.die, ()), 2: Task("", functions.add, (2,))}
+    runner = Runner(executor, tolerant=True)
+    assert run(runner, tasks) == ([(2, 2)], None)
+    (sentence,) = runner.failures
+    assert sentence.startswith("Cleaning square (0, 1) failed, because its worker process ended: ")
+
+
 KILLED = """
 import os, sys
 sys.path.insert(0, sys.argv[1])
 import functions_of_tasks as functions
-from rail_extract.core.tasks import Task
-from rail_extract.core.workers import runner
-runner.WORTH_S = 0.0
-with runner.workers(2) as two:
+from rail_extract.core.run import processes
+from rail_extract.core.run.tasks import Task
+processes.WORTH_S = 0.0
+with processes.workers(2) as two:
     list(two.run({number: Task("", functions.silent, (sys.argv[2],)) for number in range(2)}))
 """
 
@@ -250,7 +294,7 @@ def test_no_process_outlives_a_run_that_is_killed(functions, tmp_path):
 
 
 def test_little_work_and_work_that_cannot_be_divided_stay_in_this_process(functions, monkeypatch):
-    monkeypatch.setattr(runner_module, "WORTH_S", 10.0)
+    monkeypatch.setattr(module, "WORTH_S", 10.0)
     chain = {1: Task("", functions.about, (), weight=99), 2: Task("", functions.about, (), needs=(1,), weight=99)}
     little = {number: Task("", functions.about, (), weight=1) for number in range(4)}
     much = {number: Task("", functions.about, (), weight=9) for number in range(4)}
@@ -263,7 +307,7 @@ def test_little_work_and_work_that_cannot_be_divided_stay_in_this_process(functi
 
 def test_no_more_processes_are_started_than_there_are_tasks(functions, monkeypatch):
     started = []
-    monkeypatch.setattr(runner_module, "Worker", lambda *words: started.append(Worker(*words)) or started[-1])
+    monkeypatch.setattr(module, "Worker", lambda *words: started.append(Worker(*words)) or started[-1])
     with workers(3) as runner:
         for count, expected in ((2, 2), (2, 2), (5, 3)):
             found, _ = run(runner, {number: Task("", functions.add, (number,)) for number in range(count)})
@@ -295,25 +339,26 @@ def test_without_workers_this_process_does_the_work_and_says_why(functions, inte
     assert len(reasons) == 1
 
 
-def test_one_worker_is_this_process():
+def test_one_worker_is_this_process(functions):
     with workers(1) as runner:
-        assert isinstance(runner, InTurn)
+        found = dict(runner.run({number: Task("", functions.about, (), weight=9) for number in range(2)}))
+    assert {number for number, _ in found.values()} == {os.getpid()}
 
 
 def test_the_number_of_workers_follows_cores_and_memory(monkeypatch):
-    monkeypatch.setattr(runner_module, "cores", lambda: 12)
+    monkeypatch.setattr(module, "cores", lambda: 12)
     for gigabytes, most in ((1, 4), (8, 4), (16, 8), (256, 12)):
-        monkeypatch.setattr(runner_module, "memory_bytes", lambda size=gigabytes: size << 30)
+        monkeypatch.setattr(module, "memory_bytes", lambda size=gigabytes: size << 30)
         assert 2 <= worker_count(0) <= most
-        assert worker_count(0) * runner_module.WORKER_BYTES <= max(2, gigabytes / 4) * 2**30
+        assert worker_count(0) * module.WORKER_BYTES <= max(2, gigabytes / 4) * 2**30
     assert worker_count(0) == 12
     assert worker_count(40) == 40
-    monkeypatch.setattr(runner_module, "cores", lambda: 1)
+    monkeypatch.setattr(module, "cores", lambda: 1)
     assert worker_count(0) == 1
 
 
 def test_the_memory_of_this_computer_is_known():
-    assert 2**28 < runner_module.memory_bytes() < 2**46
+    assert 2**28 < module.memory_bytes() < 2**46
 
 
 def test_lines_are_the_same_to_the_last_bit(functions, tiles, tmp_path, difference):
@@ -323,7 +368,7 @@ def test_lines_are_the_same_to_the_last_bit(functions, tiles, tmp_path, differen
         folder = tmp_path / str(count)
         folder.mkdir()
         with one_thread(*blas()), workers(count) as runner:
-            found.append(extract_files(ask([tiles], [10]), folder, parameters, runner))
+            found.append(extract_files(Classified(ask([tiles], [10])), folder, parameters, runner))
     assert len(found[0].rails) > 1
     for other in found[1:]:
         for name in vars(found[0]):

@@ -10,18 +10,20 @@ import numpy as np
 import pytest
 from distributed import Client, KilledWorker, LocalCluster
 from rail_extract.core.clouds.points import ask, read_rail_points
-from rail_extract.core.cluster import runner
-from rail_extract.core.cluster.runner import DaskRunner, execute
-from rail_extract.core.cluster.store import version
 from rail_extract.core.errors import DiskError
 from rail_extract.core.pipeline import Parameters, extract_files, extract_rails
-from rail_extract.core.progress import Progress
+from rail_extract.core.pipeline.sources import Classified
+from rail_extract.core.progress import SILENT, Progress
 from rail_extract.core.rails import RailLine
+from rail_extract.core.run.cluster import Cluster, execute
+from rail_extract.core.run.loop import InTurn, Runner
+from rail_extract.core.run.tasks import Task
+from rail_extract.core.run.version import version
 from rail_extract.core.squares.grid import lay_out
+from rail_extract.core.squares.kept import KeptResults
 from rail_extract.core.squares.spool import spool
 from rail_extract.core.squares.steps import square_side
 from rail_extract.core.standards import STANDARDS
-from rail_extract.core.tasks import Task
 from rail_extract.laboratory.scenes.scene import RAIL
 
 STANDARD = STANDARDS["EN_60E1_1435"]
@@ -41,10 +43,18 @@ def one_process(tiles):
     return extract_rails(read_rail_points(tiles, [RAIL]), PARAMETERS)
 
 
-def extract(client, paths, codes, parameters, folder):
-    """Extract on workers, as the command does."""
-    on_workers = DaskRunner(client, folder)
-    return extract_files(ask(paths, codes, unreadable=on_workers.failures), folder, parameters, on_workers)
+@pytest.fixture(params=["in turn", "on workers"])
+def executor(request):
+    """Whatever executes tasks, the same results are kept."""
+    return InTurn() if request.param == "in turn" else Cluster(request.getfixturevalue("client"))
+
+
+def extract(executor, paths, folder, progress=SILENT):
+    """Extract as the command does."""
+    runner = Runner(executor, KeptResults(folder), tolerant=True)
+    return extract_files(
+        Classified(ask(paths, [RAIL], unreadable=runner.failures)), folder, PARAMETERS, runner, progress
+    )
 
 
 def same(found, expected, frame, other):
@@ -62,7 +72,7 @@ def test_a_local_worker_uses_one_core_and_keeps_its_memory(client):
 
 
 def test_workers_give_the_results_of_one_process(tiles, one_process, client, tmp_path):
-    found = extract(client, [tiles], [RAIL], PARAMETERS, tmp_path)
+    found = extract(Cluster(client), [tiles], tmp_path)
     assert found.failures == ()
     same(found.rails, one_process.rails, found.frame, one_process.frame)
     same(found.centerlines, one_process.centerlines, found.frame, one_process.frame)
@@ -77,12 +87,12 @@ def test_workers_give_the_results_of_one_process(tiles, one_process, client, tmp
     np.testing.assert_array_equal(found.cleaned[0].cells(), one_process.cleaned[0].cells())
 
 
-def test_a_restart_computes_only_what_changed(tiles, client, tmp_path):
-    extract(client, [tiles / "tile0.laz", tiles / "tile1.laz"], [RAIL], PARAMETERS, tmp_path)
+def test_a_restart_computes_only_what_changed(tiles, executor, tmp_path):
+    extract(executor, [tiles / "tile0.laz", tiles / "tile1.laz"], tmp_path)
     before = {file: file.stat().st_mtime_ns for file in tmp_path.rglob("*") if file.is_file()}
-    extract(client, [tiles / "tile0.laz", tiles / "tile1.laz"], [RAIL], PARAMETERS, tmp_path)
+    extract(executor, [tiles / "tile0.laz", tiles / "tile1.laz"], tmp_path)
     assert {file: file.stat().st_mtime_ns for file in tmp_path.rglob("*") if file.is_file()} == before
-    extract(client, [tiles], [RAIL], PARAMETERS, tmp_path)
+    extract(executor, [tiles], tmp_path)
     after = {file: file.stat().st_mtime_ns for file in tmp_path.rglob("*") if file.is_file()}
     assert before.items() <= after.items()
     assert len([file for file in after.keys() - before.keys() if file.name.startswith("clean")]) > 0
@@ -94,7 +104,9 @@ def test_a_killed_worker_is_replaced_and_its_tasks_run_again(tiles, one_process,
     def kill(client):
         while not killed:
             busy = [
-                worker for worker, tasks in client.processing().items() if any("clean" in str(task) for task in tasks)
+                worker
+                for worker, tasks in client.processing().items()
+                if any("Cleaning" in str(task) for task in tasks)
             ]
             pids = client.run(os.getpid, workers=busy[:1]) if busy else {}
             for pid in pids.values():
@@ -104,7 +116,7 @@ def test_a_killed_worker_is_replaced_and_its_tasks_run_again(tiles, one_process,
 
     killer = threading.Thread(target=kill, args=(client,), daemon=True)
     killer.start()
-    found = extract(client, [tiles], [RAIL], PARAMETERS, tmp_path)
+    found = extract(Cluster(client), [tiles], tmp_path)
     killer.join(timeout=5)
     assert len(killed) == 1
     assert found.failures == ()
@@ -113,20 +125,25 @@ def test_a_killed_worker_is_replaced_and_its_tasks_run_again(tiles, one_process,
 
 @pytest.fixture
 def lone_worker():
-    """A worker in this process, whose functions a test can replace."""
+    """A worker in this process."""
     with LocalCluster(processes=False, n_workers=1, dashboard_address=":0") as cluster, Client(cluster) as client:
         yield client
 
 
+def die(task, *arguments):
+    raise KilledWorker(task.label, None, 10)
+
+
 def test_the_neighbours_of_a_square_that_kills_its_workers_are_drawn(tiles, lone_worker, tmp_path, monkeypatch):
-    def dying(task, *arguments):
-        if task.label == f"Cleaning square {doomed} of class 10":
-            raise KilledWorker("clean", None, 10)
-        return execute(task, *arguments)
+    submit = lone_worker.submit
+
+    def submit_dying(function, task, *arguments, **named):
+        is_doomed = task.label == f"Cleaning square {doomed} of class 10"
+        return submit(die if is_doomed else function, task, *arguments, **named)
 
     doomed = max(square_keys(tiles, tmp_path))
-    monkeypatch.setattr(runner, "execute", dying)
-    found = extract(lone_worker, [tiles], [RAIL], PARAMETERS, tmp_path / "work")
+    monkeypatch.setattr(lone_worker, "submit", submit_dying)
+    found = extract(Cluster(lone_worker), [tiles], tmp_path / "work")
     assert len(found.failures) == 1
     assert found.failures[0].startswith(f"Cleaning square {doomed} of class 10 was abandoned")
     assert len(found.rails) == 2
@@ -148,8 +165,8 @@ class Heard(Progress):
         self.texts.append(text)
 
 
-def test_damaged_results_are_computed_again_with_a_warning(tiles, one_process, client, tmp_path):
-    extract(client, [tiles], [RAIL], PARAMETERS, tmp_path)
+def test_damaged_results_are_computed_again_with_a_warning(tiles, one_process, executor, tmp_path):
+    extract(executor, [tiles], tmp_path)
     sizes = {file: file.stat().st_size for file in tmp_path.glob("*.npz")}
     cleaned, drawn = (sorted(tmp_path.glob(f"{step}_*"))[0] for step in ("clean", "draw"))
     cleaned.write_bytes(cleaned.read_bytes()[:-30])
@@ -158,8 +175,7 @@ def test_damaged_results_are_computed_again_with_a_warning(tiles, one_process, c
     points.write_bytes(points.read_bytes()[:-24])
     heard = Heard()
     for _ in range(2):
-        on_workers = DaskRunner(client, tmp_path)
-        found = extract_files(ask([tiles], [RAIL]), tmp_path, PARAMETERS, on_workers, heard)
+        found = extract(executor, [tiles], tmp_path, heard)
         assert found.failures == ()
         same(found.rails, one_process.rails, found.frame, one_process.frame)
     assert len(heard.texts) == 3  # all from the first restart
@@ -184,8 +200,8 @@ def first_of(name, context):
 
 
 def test_no_step_runs_on_a_worker_of_another_version(tmp_path):
-    for task in (Task("Cleaning", first_of, ("a",)), Task("Drawing", first_of, ("b",), needs=("a",))):
-        assert "another version" in execute(task, {}, str(tmp_path), "older").failure
+    task = KeptResults(tmp_path).kept(Task("Cleaning", first_of, ("a",)))
+    assert "another version" in str(execute(task, {}, "older").error)
     assert list(tmp_path.iterdir()) == []
-    assert execute(task, {}, str(tmp_path), version()).result.path.endswith(".npz")
-    assert execute(task, {}, str(tmp_path), "older").failure  # although the result is there
+    assert execute(task, {}, version()).result.path.endswith(".npz")
+    assert execute(task, {}, "older").error  # although the result is there

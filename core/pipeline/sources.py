@@ -1,0 +1,148 @@
+"""Where rail points come from: classified clouds, raw clouds in which they are found, or seeds from which they grow."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+
+from ..checks.standard import warn_of_gauge
+from ..classify.settings import Settings
+from ..clouds.las import CloudHeader
+from ..clouds.points import AIRBORNE, Request, read_each
+from ..disk import writing
+from ..errors import CloudError, NoRailPointsError, RailExtractError
+from ..grow.settings import GrowSettings
+from ..labelling.finding import find_rail_points, report
+from ..labelling.growing import grow_points
+from ..parameters import Parameters
+from ..progress import Progress
+from ..rails import SearchFigures
+from ..run.loop import Runner
+from ..run.tasks import Context
+from ..scratch import scratch_folder
+from ..squares.grid import SortedPoints
+from ..squares.spool import Census, SpooledFile, gather, spool_file
+from ..squares.steps import square_side
+from ..standards import RAIL_CLASS
+
+READING = 0.2
+"""Run time of sorting rail points relative to that of the walk, for the progress."""
+
+FINDING = 4.0
+"""The same of finding them in a raw cloud, which has 10 to 100 times as many points."""
+
+
+class Source(Protocol):
+    """A cloud whose rail points can be sorted into squares."""
+
+    @property
+    def run_time(self) -> float:
+        """Run time relative to that of the walk."""
+
+    def sort(
+        self, folder: Path, parameters: Parameters, runner: Runner, progress: Progress
+    ) -> AbstractContextManager[SortedPoints]:
+        """Sort the points into squares on disk, in a folder that the caller removes."""
+
+
+@dataclass(frozen=True)
+class Classified:
+    """The points of the classes in a request."""
+
+    request: Request
+    run_time = READING
+
+    @contextmanager
+    def sort(self, folder: Path, parameters: Parameters, runner: Runner, progress: Progress) -> Iterator[SortedPoints]:
+        """See `Source`; points that were sorted in this folder before are not read again."""
+        side_m = square_side(parameters)
+        is_warned = warn_of_gauge(self.request, parameters, progress)
+        self.request.announce(progress)
+        arguments = [(side_m, folder)] * len(self.request.headers)
+        files = read_each(self.request, _sort_file, arguments, runner, progress)
+        yield SortedPoints(gather(self.request, side_m, files), is_warned=is_warned)
+
+
+def _sort_file(request: Request, header: CloudHeader, side_m: float, folder: Path, context: Context) -> SpooledFile:
+    """Sort the points of one file; a task."""
+    try:
+        return spool_file(request, header, side_m, folder, context.progress)
+    except OSError as error:
+        raise CloudError(
+            f"{header.path.name} can't be read ({error.strerror}): check the disk or the network drive."
+        ) from error
+
+
+@dataclass(frozen=True)
+class Raw:
+    """The rails of a raw cloud, given a request for `standards.SEARCHED_CLASSES`.
+
+    They are found by the network whose weights are given, or else by their shape.
+    """
+
+    request: Request
+    weights: Path | None = None
+    run_time = FINDING
+
+    @contextmanager
+    def sort(self, folder: Path, parameters: Parameters, runner: Runner, progress: Progress) -> Iterator[SortedPoints]:
+        """See `Source`; the points become those of `RAIL_CLASS`."""
+        settings = Settings(parameters.gauges_m, parameters.head_width_m, weights=self.weights)
+        census, figures, side_m = Census(), SearchFigures(), square_side(parameters)
+        with scratch_folder(folder) as sorted_points:
+            with writing(sorted_points), scratch_folder(sorted_points) as squares:
+                for found in find_rail_points(self.request, settings, squares, runner, progress):
+                    census.add(RAIL_CLASS, found.xyz, found.marks, self.request.zero, side_m, sorted_points)
+                    figures += found.figures
+            if not figures.points:
+                raise self._nothing_found(runner.failures)
+            report(figures, self.request, progress)
+            points = _gathered(self.request, side_m, sorted_points, census, figures)
+            yield replace(points, only_pairs=True)
+
+    def _nothing_found(self, failures: Sequence[str]) -> RailExtractError:
+        if failures:
+            return RailExtractError(
+                f"No rail was found, and a part of the cloud could not be searched; the last error was: {failures[-1]}"
+            )
+        airborne = f" For an airborne cloud, use {AIRBORNE}." if self.request.is_airborne else ""
+        return NoRailPointsError(
+            "No rail was found in the raw cloud: check the rail standard and the unit of the coordinates, or classify "
+            f"the rail points yourself.{airborne}"
+        )
+
+
+@dataclass(frozen=True)
+class Grown:
+    """The rails of a raw cloud that grow from seeds, (k, 2) arrays in units of the CRS: places on heads, or lines."""
+
+    request: Request
+    seeds: Sequence[np.ndarray]
+    run_time = FINDING
+
+    @contextmanager
+    def sort(self, folder: Path, parameters: Parameters, runner: Runner, progress: Progress) -> Iterator[SortedPoints]:
+        """See `Source`; the points become those of `RAIL_CLASS`."""
+        settings = GrowSettings(parameters.gauge_m, parameters.head_width_m)
+        census, side_m = Census(), square_side(parameters)
+        with scratch_folder(folder) as sorted_points:
+
+            def keep(points: np.ndarray) -> None:
+                with writing(sorted_points):
+                    census.add(RAIL_CLASS, points["xyz"], points["mark"], self.request.zero, side_m, sorted_points)
+
+            with writing(sorted_points), scratch_folder(sorted_points) as squares:
+                _, figures = grow_points(self.request, self.seeds, settings, squares, keep, progress)
+            yield _gathered(self.request, side_m, sorted_points, census, figures)
+
+
+def _gathered(request: Request, side_m: float, folder: Path, census: Census, figures: SearchFigures) -> SortedPoints:
+    """Return the points that were found in a raw cloud."""
+    (source,) = gather(request, side_m, [SpooledFile(str(folder), census.report())])
+    blunt = True if figures.blunt_m else None  # narrow ones may have no edges either
+    return SortedPoints([replace(source, found=True, blunt=blunt)], figures)
