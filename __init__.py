@@ -3,7 +3,7 @@
 >>> from pathlib import Path
 >>> import rail_extract as rx
 >>> network = rx.extract(Path(rx.__file__).parent / "resources" / "sample" / "sample.laz", standard="IN_75R_1000")
->>> len(network.centerlines)
+>>> len(network.found.centerlines)
 3
 """
 
@@ -13,9 +13,9 @@ from .core import VERSION as __version__  # noqa: N811 - the name that packages 
 from .core.jobs import CALLS
 
 if TYPE_CHECKING:
-    from .core.front import Network, extract
+    from .core.front import Result
 
-__all__ = ["Network", "__version__", "extract", *CALLS]  # noqa: PLE0604
+__all__ = ["Result", "__version__", *CALLS]  # noqa: PLE0604
 
 
 def __getattr__(name: str) -> Any:

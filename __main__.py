@@ -16,8 +16,8 @@ PROGRAM = "python -m rail_extract"
 JOB = "core.commands.jobs"
 
 COMMANDS = {
-    "extract": ("core.commands.extract.extract", "extract rails and track centerlines on several cores or computers"),
     **{name.replace("_", "-"): (f"{JOB}.{name}", job.summary) for name, job in CALLS.items()},
+    "extract": ("core.commands.extract.extract", CALLS["extract"].summary),
     "stations": ("core.commands.lines.stations", "give features their kilometre along an axis"),
     "onnx": ("core.frpdf.onnx.add_arguments", "write the network for other runtimes"),
     "train": ("laboratory.training.train.add_arguments", "train the network on synthetic rasters"),

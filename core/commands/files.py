@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import replace
 from functools import partial
+from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, Callable
@@ -22,6 +23,7 @@ from ..jobs.declaration import Job, Parameter
 from ..jobs.result import Result
 from ..jobs.shared import WEB_PAGES
 from ..jobs.values import Rows, Values
+from ..output.raster_file import write_rasters
 from ..progress import Progress
 from ..run.loop import Runner
 from ..run.processes import workers
@@ -32,13 +34,14 @@ if TYPE_CHECKING:
     from ..airborne.survey import Guide
     from ..alignment.placed_axes import PlacedAxes
     from ..jobs.lines import Lines
+    from ..jobs.result import Rasters
     from .vectors import Features
 
 Spell = Callable[[Parameter], str]
 """Returns how a front end names a parameter."""
 
-LAYERS, PAGES = (".gpkg", ".dxf", ".csv"), (".html", ".htm")
-"""Suffixes of the files for layers, of which only a GeoPackage holds several, and for web pages."""
+LAYERS, PAGES, RASTERS = (".gpkg", ".dxf", ".csv"), (".html", ".htm"), (".tif", ".tiff")
+"""Suffixes of the files for layers, of which only a GeoPackage holds several, for web pages and for rasters."""
 
 
 class FileValues(Values):
@@ -65,6 +68,9 @@ class FileValues(Values):
         self._values = {one.name: read_value(one, given.get(one.name)) for one in job.parameters}
         self._filled = {name for name, one in given.items() if not (one is None or (isinstance(one, str) and not one))}
         named = {one.name: given.get(one.name) for one in job.outputs}
+        for one in job.outputs:
+            if named[one.name] is not None:
+                check_packages(one)
         self.destinations = destinations_of(job, {name: Path(file) for name, file in named.items() if file is not None})
 
     def __getitem__(self, name: str) -> Any:
@@ -167,15 +173,14 @@ class FileValues(Values):
         return self._features[name]
 
 
-def run_with_files(
-    job: Job, given: Mapping[str, Any], command: str, progress: Progress, spell: Spell, keeps: bool = False
-) -> Result:
+def run_with_files(job: Job, make: Callable[[], FileValues], progress: Progress, spell: Spell) -> Result:
     """Run a job and write the outputs that were given; one that fails does not stop the others.
 
     Parameters
     ----------
-    job, given, command, keeps
-        See `FileValues`.
+    job : Job
+    make : callable
+        Returns the values.
     progress : Progress
     spell : callable
         Returns how messages name a parameter.
@@ -186,10 +191,11 @@ def run_with_files(
         A value is wrong, or an output could not be written.
     """
     try:
-        values = FileValues(job, given, command, keeps)
+        values = make()
         job.check(values)
         result = job.run(values, progress)
-        for name in sorted(set(values.destinations) - {*result.layers, *result.pages, *result.figures}):
+        made = {*result.layers, *result.pages, *result.rasters, *result.figures}
+        for name in sorted(set(values.destinations) - made):
             progress.warning(f"{name} is not written: a run with these inputs does not make it.")
         errors = list(_failures(result, values))
         if len(errors) > 1:
@@ -213,11 +219,20 @@ def _failures(result: Result, values: FileValues) -> Iterator[RailExtractError]:
         writers.append(partial(writing_module.write_layers, *together))
     pages = {name: make for name, make in result.pages.items() if values.wanted(name)}
     writers += [partial(_write_page, values.destination(name), make) for name, make in pages.items()]
+    rasters = {name: make for name, make in result.rasters.items() if values.wanted(name)}
+    writers += [partial(_write_rasters, values.destination(name), make) for name, make in rasters.items()]
     for write in writers:
         try:
             write()
         except RailExtractError as error:
             yield error
+
+
+def _write_rasters(destination: Destination, make: Callable[[], Rasters | None]) -> None:
+    made = make()
+    if made is not None:
+        with destination.replacing() as new:
+            write_rasters(new, *made)
 
 
 def _write_page(destination: Destination, make: Callable[[], str]) -> None:
@@ -325,6 +340,20 @@ READERS: dict[type, Callable[[Any, Any], Any]] = {
 """Functions that read a value, by the kind of the parameter; others are texts."""
 
 
+def check_packages(one: kinds.Output) -> None:
+    """Check before a run that an output can be written.
+
+    Raises
+    ------
+    ParameterError
+        A package is not installed.
+    """
+    if isinstance(one, kinds.LayerOutput):
+        vector_module(one.name, ".output.writing")
+    elif isinstance(one, kinds.RasterOutput) and find_spec("rasterio") is None:
+        raise ParameterError(f"{one.name} needs the package rasterio: in a clone, run pip install .[cluster].")
+
+
 def destinations_of(job: Job, files: Mapping[str, Path]) -> dict[str, Destination]:
     """Check that outputs can be written, make their folders, and return their destinations.
 
@@ -345,6 +374,7 @@ def destinations_of(job: Job, files: Mapping[str, Path]) -> dict[str, Destinatio
             path = path.with_suffix(CATALOGUE)
         is_page = isinstance(one, kinds.FileOutput) and one.kinds == WEB_PAGES
         suffixes = LAYERS if isinstance(one, kinds.LayerOutput) else PAGES if is_page else ()
+        suffixes = RASTERS if isinstance(one, kinds.RasterOutput) else suffixes
         if suffixes and path.suffix.lower() not in suffixes:
             raise ParameterError(f"{one.name} can't be {path.name}: let it end in {' or '.join(suffixes)}.")
         with writing(path.parent):

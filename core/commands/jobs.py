@@ -10,8 +10,9 @@ from typing import Any
 from ..jobs import CALLS
 from ..jobs import declaration as kinds
 from ..jobs.declaration import Job, Parameter
-from ..progress import Estimating
-from .files import run_with_files
+from ..jobs.result import Result
+from ..progress import Estimating, Progress
+from .files import FileValues, run_with_files
 from .options import Console
 
 
@@ -71,8 +72,22 @@ def _help(one: Parameter) -> str:
 
 def _run(job: Job, args: argparse.Namespace) -> None:
     """Run with what was given, and print the result in words."""
-    given: dict[str, Any] = {one.name: getattr(args, one.name) for one in (*job.parameters, *job.outputs)}
-    progress = Estimating(Console(lambda sentence: job.reworded(sentence, option)))
-    result = run_with_files(job, given, args.command_line, progress, option)
+    run_and_print(job, partial(FileValues, job, given_to(job, args), args.command_line), console_of(job))
+
+
+def given_to(job: Job, args: argparse.Namespace) -> dict[str, Any]:
+    """Return what a command was given, by the names of parameters and outputs."""
+    return {one.name: getattr(args, one.name) for one in (*job.parameters, *job.outputs)}
+
+
+def console_of(job: Job) -> Progress:
+    """Return the progress of a command, which names options."""
+    return Estimating(Console(lambda sentence: job.reworded(sentence, option)))
+
+
+def run_and_print(job: Job, make: Callable[[], FileValues], progress: Progress) -> Result:
+    """Run a job with what a command was given, and print the result in words."""
+    result = run_with_files(job, make, progress, option)
     for sentence in result.sentences:
         print(sentence)
+    return result

@@ -45,7 +45,13 @@ class CloudSource:
     leave_out: tuple[str, ...] = ()
 
 
-def request_points(source: CloudSource, class_codes: Sequence[int], bounds: BoundsIn, progress: Progress) -> Request:
+def request_points(
+    source: CloudSource,
+    class_codes: Sequence[int],
+    bounds: BoundsIn,
+    progress: Progress,
+    unreadable: list[str] | None = None,
+) -> Request:
     """Check which points of which files are to be read, and read the headers of the files.
 
     Parameters
@@ -54,10 +60,13 @@ def request_points(source: CloudSource, class_codes: Sequence[int], bounds: Boun
     class_codes : sequence of int
     bounds : callable
     progress : Progress
+    unreadable : list of str, optional
+        Gets what is wrong with files that can't be read; without it, one ends the run.
     """
     from ..clouds.points import ask
 
-    request = ask(source.paths, class_codes, source.crs_wkt, bounds(crs_of(source)), progress)
+    bounds_of_all = bounds(crs_of(source))
+    request = ask(source.paths, class_codes, source.crs_wkt, bounds_of_all, progress, unreadable=unreadable)
     return replace(request, mask=source.mask, leave_out=source.leave_out)
 
 

@@ -90,6 +90,7 @@ def _run(values: Values, progress: Progress) -> Result:
         {"OUTPUT": lambda: differences_layer(found)},
         {"REPORT": lambda: build_comparison(found, not ignored, source, facts)},
         (verdict_on(found), describe_shift(found)),
+        found=found,
     )
 
 

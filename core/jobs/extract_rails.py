@@ -3,10 +3,154 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
-from ..parameters import STRIPS, Parameters
+from ..errors import ParameterError
+from ..frpdf.models import choose as choose_model
+from ..parameters import LEARNED, STRIPS, Parameters
+from ..progress import Estimating, counted
+from ..standards import DEFAULT, SEARCHED_CLASSES
 from . import shared
 from .declaration import CLOUD_NEEDS, CLOUD_WORDS, RAIL_WORDS, TRACK_WORDS, Choice, Flag, Job, RasterOutput
+
+if TYPE_CHECKING:
+    from ..clouds.points import Request
+    from ..pipeline.sources import Source
+    from ..progress import Progress
+    from ..rails import RailNetwork
+    from ..report import Origin
+    from ..standards import RailStandard
+    from .result import Rasters, Result
+    from .values import Values
+
+MEASURED = ("QUALITY", "FINDINGS", "REPORT")
+"""Outputs for which the geometry of tracks is measured."""
+
+
+def _check(values: Values) -> None:
+    """Check all values, as far as no points are needed."""
+    names = [output.name for output in values.job.outputs]
+    if not values.keeps and not any(map(values.wanted, names)):
+        raise ParameterError(f"No output is chosen: name at least one of {', '.join(names)}.")
+    classify, grow = values["CLASSIFY"], values.filled("SEEDS")
+    if classify and grow:
+        raise ParameterError("CLASSIFY finds all rails, and SEEDS those that are pointed at: choose one of them.")
+    if grow and values.detects():
+        raise ParameterError("STANDARD DETECT measures classified points, which SEEDS do not need: choose another.")
+    if values["METHOD"] == LEARNED and not classify:
+        raise ParameterError("METHOD LEARNED is for raw clouds: set CLASSIFY, or set METHOD to GEOMETRY.")
+    values.weights()
+    values.engine()
+    _class_codes(values)
+    standard = values.standard(DEFAULT if values.detects() else None)
+    choose_model(standard.gauge_m, standard.head_width_m, values["MODEL"])
+    values.settings(standard, values.other_gauges(standard))
+    if grow:
+        values.seeds(values.cloud_crs())
+    if values.has_axis():
+        if not _measures(values):
+            raise ParameterError("AXIS gives QUALITY, FINDINGS and REPORT kilometres: name at least one of these.")
+        values.axes(values.cloud_crs())
+
+
+def _measures(values: Values) -> bool:
+    """Return whether the geometry of tracks is measured."""
+    return values.keeps or any(map(values.wanted, MEASURED))
+
+
+def _class_codes(values: Values) -> tuple[int, ...]:
+    """Return the classes to read: all in which the rails of a raw cloud may be, or those of rails."""
+    return SEARCHED_CLASSES if values["CLASSIFY"] or values.filled("SEEDS") else values.class_codes()
+
+
+def _detected(values: Values, request: Request, progress: Progress) -> RailStandard:
+    """Return the rail standard, if need be the one that fits the points."""
+    from ..checks.standard import detect_in_raw, detect_standard
+
+    if not values.detects():
+        return values.standard()
+    progress.status("Measuring gauge and railheads")
+    detect = detect_in_raw if values["CLASSIFY"] else detect_standard
+    standard = values.standard(detect(request, progress.span(0, 0)).name)
+    choose_model(standard.gauge_m, standard.head_width_m, values["MODEL"])
+    return standard
+
+
+def _source(values: Values, request: Request) -> Source:
+    """Return where the rail points come from."""
+    from ..pipeline.sources import Classified, Grown, Raw
+
+    if values["CLASSIFY"]:
+        weights = values.weights()
+        return Raw(request, weights and weights.resolve())
+    if values.filled("SEEDS"):
+        return Grown(request, values.seeds(values.cloud_crs()))
+    return Classified(replace(request, merged=values["MERGE_CLASSES"]))
+
+
+def _run(values: Values, progress: Progress) -> Result:
+    """Extract the rails and tracks."""
+    from ..pipeline import extract_files
+    from ..report import Origin
+
+    progress = Estimating(progress)
+    with values.scratch() as folder, values.runner() as runner:
+        request = values.request(_class_codes(values), progress, runner.failures if runner.tolerant else None)
+        standard = _detected(values, request, progress)
+        other_gauges = values.other_gauges(standard)
+        settings = replace(
+            values.settings(standard, other_gauges),
+            quality_step_m=values["STEP"] if _measures(values) else None,
+            keep_cleaned=values.wanted("CLEANED"),
+        )
+        network = extract_files(_source(values, request), folder, settings, runner, progress)
+    progress.check()
+    if values.has_axis():
+        geometry = values.axes(values.cloud_crs()).along(network.geometry, network.frame, progress)
+        network = replace(network, geometry=geometry)
+    for failure in network.failures:
+        progress.warning(failure)
+    return _result(values, network, Origin(values.cloud().paths, standard, other_gauges, values.command, settings))
+
+
+def _result(values: Values, network: RailNetwork, origin: Origin) -> Result:
+    """Return what was extracted as a result."""
+    from ..output.layers import network_makers
+    from ..report import summary
+    from .result import Result, ShownCloud
+
+    figures: dict[str, Any] = {
+        **shared.figures_of(network.rails, "RAIL"),
+        **shared.figures_of(network.centerlines, "CENTERLINE"),
+        **(shared.figures_of_stations(network.geometry) if _measures(values) else {}),
+        "ENGINE_USED": network.engine,
+    }
+    counts = (
+        f"{counted(len(lines), what)}, {sum(line.length_m for line in lines) / 1000:.3f} km"
+        for lines, what in ((network.rails, "rail"), (network.centerlines, "centerline"))
+    )
+    return Result(
+        figures,
+        network.frame,
+        {name.upper(): make for name, make in network_makers(network, origin.gauges_m).items()},
+        {"REPORT": lambda: origin.report(network)},
+        (*counts, *summary(network, origin.gauges_m)),
+        ShownCloud("INPUT", _class_codes(values), origin.standard.head_width_m),
+        {"CLEANED": lambda: _cleaned(values, network, origin.standard)},
+        network,
+    )
+
+
+def _cleaned(values: Values, network: RailNetwork, standard: RailStandard) -> Rasters | None:
+    """Return the network's output as Clean Rail Raster writes it; None if no rail cell is left."""
+    from ..output.raster_file import header_for, on_one_grid
+
+    if not any(raster.tiles for raster in network.cleaned):
+        return None
+    rasters, frame = on_one_grid(network.cleaned, network.frame)
+    extent, model = values.extent(network.frame.crs_wkt), values["MODEL"]
+    return header_for(rasters, network.cleaned_classes, frame, standard, extent, model), rasters
+
 
 JOB = Job(
     "extractrails",
@@ -85,4 +229,7 @@ JOB = Job(
     (*shared.RAIL_FIGURES, *shared.CENTERLINE_FIGURES, *shared.QUALITY_FIGURES, shared.ENGINE_USED),
     picture="gauge.svg",
     pages=("parameters", "tutorial", "limits", "troubleshooting"),
+    call="extract",
+    check=_check,
+    run=_run,
 )

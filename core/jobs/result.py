@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
@@ -17,6 +17,10 @@ if TYPE_CHECKING:
     import geopandas
 
     from ..frame import LocalFrame
+    from ..output.raster_file import RasterHeader
+    from ..raster import RailRaster
+
+    Rasters = tuple[RasterHeader, Sequence[RailRaster]]
 
 
 @dataclass(frozen=True)
@@ -49,6 +53,10 @@ class Result:
     sentences : tuple of str
         The result in words.
     cloud : ShownCloud, optional
+    rasters : mapping of str to callable
+        Makes rasters of one grid and their header, None if they are empty, by the name of the output.
+    found : object
+        What layers and pages are made from, such as a `RailNetwork`.
     """
 
     figures: Mapping[str, Any]
@@ -57,6 +65,8 @@ class Result:
     pages: Mapping[str, Callable[[], str]] = field(default_factory=dict)
     sentences: tuple[str, ...] = ()
     cloud: ShownCloud | None = None
+    rasters: Mapping[str, Callable[[], Rasters | None]] = field(default_factory=dict)
+    found: Any = None
 
     def to_geodataframe(self, layer: str) -> geopandas.GeoDataFrame:
         """Return a layer as a table, with the fields of docs/reference.md and the coordinate system.

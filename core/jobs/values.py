@@ -160,10 +160,10 @@ class Values(ABC):
         """Whether the result stays after the run, so that its layers can be had without naming files."""
         return False
 
-    def request(self, class_codes: Sequence[int], progress: Progress) -> Request:
-        """Check which points are to be read, and read the headers of the files."""
+    def request(self, class_codes: Sequence[int], progress: Progress, unreadable: list[str] | None = None) -> Request:
+        """Check which points are to be read, and read the headers of the files; see `request_points`."""
         bounds = self.extent if self.has("EXTENT") else lambda _: None
-        return request_points(self.cloud(), class_codes, bounds, progress)
+        return request_points(self.cloud(), class_codes, bounds, progress, unreadable)
 
     def cloud_crs(self) -> str | None:
         """Return the coordinate system of the cloud; see `checked_crs`."""

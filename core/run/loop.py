@@ -174,7 +174,7 @@ class Runner:
     ) -> None:
         self.failures: list[str] = []
         self._executor: Executor = InTurn() if executor is None else executor
-        self._keeping, self._tolerant = keeping, tolerant
+        self._keeping, self.tolerant = keeping, tolerant
 
     def run(self, tasks: Mapping[Name, Task], progress: Progress = SILENT) -> Iterator[tuple[Name, Any]]:
         """Execute tasks, those that are listed first before others; yields the results that are to be returned."""
@@ -182,7 +182,7 @@ class Runner:
         if self._keeping is not None:
             tasks = {name: self._keeping.kept(task) for name, task in tasks.items()}
         try:
-            for name, answer in _Run(tasks, executor, progress, self._tolerant).answers():
+            for name, answer in _Run(tasks, executor, progress, self.tolerant).answers():
                 for method, text in answer.said:
                     getattr(progress, method)(text)
                 try:
@@ -205,7 +205,7 @@ class Runner:
 
     def _note(self, task: Task, error: BaseException) -> None:
         """Record that a task has failed, or raise its error if the others are not to continue."""
-        if not self._tolerant or isinstance(error, ENDING):
+        if not self.tolerant or isinstance(error, ENDING):
             raise error
         self.failures.append(str(error) if isinstance(error, NAMED) else f"{task.label} failed ({error}).")
 

@@ -6,7 +6,6 @@ from ...core.jobs import JOBS
 from ...core.jobs.declaration import Job
 from .base import JobAlgorithm, RailAlgorithm
 from .check_installation import CheckInstallation
-from .extract_rails import ExtractRails
 from .frpdf_cleanup import FrpdfCleanup
 from .install_packages import InstallPackages
 from .rasterize_rail_points import RasterizeRailPoints
@@ -22,7 +21,6 @@ def _of(job: Job) -> type[RailAlgorithm]:
 OWN = {
     algorithm.JOB.name: algorithm
     for algorithm in (
-        ExtractRails,
         RasterizeRailPoints,
         FrpdfCleanup,
         VectorizeRails,

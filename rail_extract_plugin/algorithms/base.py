@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from qgis.core import (
     QgsApplication,
@@ -37,12 +37,15 @@ from ..runs.missing import with_link
 from ..runs.running import running
 from ..setup.dependencies import explain_missing, missing_packages
 from ..writing.destinations import PAGE, appends, check_layer_name, check_page_name, destinations
-from ..writing.layers import layer_writers
+from ..writing.layers import layer_writers, write_raster
 from ..writing.reports import write_shown
 from ..writing.run import new_run, properties_of
 from ..writing.styling import NO_PROPERTIES
 from ..writing.whole_files import write_each
 from .sentences import COMMAND_LINE, sentence_for
+
+if TYPE_CHECKING:
+    from ...core.jobs.result import Rasters
 
 
 class RailAlgorithm(QgsProcessingAlgorithm):
@@ -267,9 +270,18 @@ class JobAlgorithm(RailAlgorithm):
             self.layer_properties = properties_of(cloud, *shown, result.frame)
         for sentence in result.sentences:
             progress.info(sentence)
-        writers = layer_writers(values, result.layers, result.frame)
+        writers: dict[str, Callable[[], dict[str, str]]] = {
+            name: partial(_write_rasters, values, name, make) for name, make in result.rasters.items()
+        }
+        writers.update(layer_writers(values, result.layers, result.frame))
         writers.update({name: partial(write_shown, values, make, name) for name, make in result.pages.items()})
         return {**write_each(writers, values), **result.figures}
+
+
+def _write_rasters(values: ParameterValues, name: str, make: Callable[[], Rasters | None]) -> dict[str, str]:
+    """Write rasters if they are wanted, and not empty."""
+    made = make() if values.wanted(name) else None
+    return {} if made is None else write_raster(values, name, *made)
 
 
 def _is_page(definition: QgsProcessingParameterDefinition) -> bool:

@@ -10,7 +10,6 @@ import rail_extract as rx
 from rail_extract.core.clouds.points import read_rail_points
 from rail_extract.core.errors import ParameterError
 from rail_extract.core.fields import CENTERLINE_FIELDS, QUALITY_FIELDS, RAIL_FIELDS
-from rail_extract.core.front import LAYERS
 from rail_extract.core.parameters import Parameters
 from rail_extract.core.pipeline import extract_rails
 from rail_extract.core.standards import STANDARDS
@@ -21,16 +20,16 @@ STANDARD = STANDARDS["IN_75R_1000"]
 
 @pytest.fixture(scope="module")
 def network():
-    return rx.extract(SAMPLE, standard="IN_75R_1000", passes=1, engine="OPENCV")
+    return rx.extract(SAMPLE, standard="IN_75R_1000", iterations=1, engine="OPENCV", workers=1)
 
 
 def test_lines_are_those_of_the_walk(network):
     parameters = Parameters(STANDARD.gauge_m, STANDARD.head_width_m, passes=1, engine="OPENCV", quality_step_m=1.0)
     expected = extract_rails(read_rail_points(SAMPLE, [10]), parameters)
-    assert len(network.rails) == len(expected.rails) == 6
-    for one, other in zip(network.rails, expected.rails):
+    assert len(network.found.rails) == len(expected.rails) == 6
+    for one, other in zip(network.found.rails, expected.rails):
         np.testing.assert_array_equal(one.xyz, other.xyz)
-    assert [track.gauge_mm for track in network.centerlines] == [track.gauge_mm for track in expected.centerlines]
+    assert [track.gauge_mm for track in network.found.centerlines] == [track.gauge_mm for track in expected.centerlines]
 
 
 def test_importing_the_package_imports_no_numpy():
@@ -48,30 +47,35 @@ def test_public_names_are_listed_and_others_are_not_there():
 def test_a_geopackage_gets_all_layers(network, tmp_path):
     pyogrio = pytest.importorskip("pyogrio")
     network.save(tmp_path / "out.gpkg")
-    assert [name for name, _ in pyogrio.list_layers(tmp_path / "out.gpkg")] == list(LAYERS)
+    assert [name for name, _ in pyogrio.list_layers(tmp_path / "out.gpkg")] == [
+        "rails",
+        "centerlines",
+        "quality",
+        "findings",
+    ]
     for name, fields in (("rails", RAIL_FIELDS), ("centerlines", CENTERLINE_FIELDS), ("quality", QUALITY_FIELDS)):
         info = pyogrio.read_info(tmp_path / "out.gpkg", layer=name)
         assert list(info["fields"]) == [field.name for field in fields]
-    assert pyogrio.read_info(tmp_path / "out.gpkg", layer="rails")["features"] == len(network.rails)
+    assert pyogrio.read_info(tmp_path / "out.gpkg", layer="rails")["features"] == len(network.found.rails)
 
 
 def test_other_files_get_one_layer(network, tmp_path):
     pytest.importorskip("pyogrio")
     network.save(tmp_path / "rails.csv")
     network.save(str(tmp_path / "tracks.csv"), "centerlines")
-    assert len((tmp_path / "rails.csv").read_text().splitlines()) == 1 + len(network.rails)
-    assert len((tmp_path / "tracks.csv").read_text().splitlines()) == 1 + len(network.centerlines)
+    assert len((tmp_path / "rails.csv").read_text().splitlines()) == 1 + len(network.found.rails)
+    assert len((tmp_path / "tracks.csv").read_text().splitlines()) == 1 + len(network.found.centerlines)
 
 
 def test_a_table_has_fields_geometry_and_coordinate_system(network):
     pytest.importorskip("geopandas")
     table = network.to_geodataframe("rails")
     assert list(table.columns) == [*(field.name for field in RAIL_FIELDS), "geometry"]
-    assert table["rail_id"].tolist() == [rail.rail_id for rail in network.rails]
-    assert table["length_m"].tolist() == pytest.approx([rail.length_m for rail in network.rails], abs=0.001)
+    assert table["rail_id"].tolist() == [rail.rail_id for rail in network.found.rails]
+    assert table["length_m"].tolist() == pytest.approx([rail.length_m for rail in network.found.rails], abs=0.001)
     assert table.crs.to_epsg() == 32643
     place = table.geometry[0].coords[0]
-    np.testing.assert_allclose(place, network.frame.to_crs(network.rails[0].xyz[:1])[0], atol=1e-6)
+    np.testing.assert_allclose(place, network.frame.to_crs(network.found.rails[0].xyz[:1])[0], atol=1e-6)
 
 
 def test_the_report_names_file_and_call(network, tmp_path):
@@ -86,8 +90,7 @@ def test_the_report_names_file_and_call(network, tmp_path):
     [
         (lambda network: network.save("out.shp"), "out.shp can't be written: let the name end in .gpkg or .dxf"),
         (lambda network: network.save("out.gpkg", "tracks"), "There is no layer 'tracks': choose one of rails"),
-        (lambda network: rx.extract(SAMPLE, gap_m=3.0), "There is no parameter 'gap_m': choose from"),
-        (lambda network: rx.extract(SAMPLE, standard="UIC60"), "The rail standard 'UIC60' is unknown"),
+        (lambda network: rx.extract(SAMPLE, standard="UIC60"), "standard can't be UIC60: give one of its 48 choices"),
     ],
 )
 def test_a_wrong_argument_is_refused_with_a_remedy(network, call, said):
@@ -110,7 +113,8 @@ def test_raw_points_are_classified_into_a_copy_from_which_rails_come(tmp_path):
     assert figures["PAIRED_LENGTH"] == pytest.approx(100, abs=6)
     labelled = laspy.read(tmp_path / "new.laz").classification
     assert np.count_nonzero(np.asarray(labelled) == 10) == figures["RAIL_POINTS"]
-    found = rx.extract(tmp_path / "new.laz", standard="EN_49E1_1000", passes=1, engine="OPENCV")
-    direct = rx.extract(tmp_path / "raw.laz", standard="EN_49E1_1000", raw=True, passes=1, engine="OPENCV")
+    how = {"standard": "EN_49E1_1000", "iterations": 1, "engine": "OPENCV", "workers": 1}
+    found = rx.extract(tmp_path / "new.laz", **how).found
+    direct = rx.extract(tmp_path / "raw.laz", classify=True, **how).found
     assert len(found.rails) == len(direct.rails) == 2
     assert direct.search.points == figures["RAIL_POINTS"]

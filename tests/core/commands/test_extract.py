@@ -19,8 +19,8 @@ shapely = pytest.importorskip("shapely")
 pytest.importorskip("distributed")
 
 from rail_extract.__main__ import INTERRUPTED, main  # noqa: E402
+from rail_extract.core import pipeline  # noqa: E402
 from rail_extract.core.clouds.points import read_rail_points  # noqa: E402
-from rail_extract.core.commands import extract  # noqa: E402
 from rail_extract.core.commands.extract import INCOMPLETE  # noqa: E402
 from rail_extract.core.fields import FINDING_FIELDS, QUALITY_FIELDS, RAIL_FIELDS  # noqa: E402
 from rail_extract.core.pipeline import Parameters, extract_files, extract_rails  # noqa: E402
@@ -173,7 +173,7 @@ def test_an_output_that_fails_does_not_stop_the_others(tiles, scheduler, tmp_pat
         shutil.rmtree(report.parent)
         return extract_files(*arguments)
 
-    monkeypatch.setattr(extract, "extract_files", remove_folder)
+    monkeypatch.setattr(pipeline, "extract_files", remove_folder)
     words = ["extract", str(tiles), "--rails", str(out), "--report", str(report)]
     assert main([*words, "--cleaned", str(cleaned), *scheduler, *FAST]) == 1
     assert f"{report} can't be written" in capsys.readouterr().err
@@ -191,18 +191,21 @@ def test_an_output_that_is_a_folder_is_refused_before_the_run(tiles, tmp_path, c
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["--rails", "out.shp"], "--rails writes .gpkg"),
-        (["--quality", "out.tab"], "--quality writes .gpkg"),
-        (["--rails", "out.dxf", "--centerlines", "out.dxf"], "Only a GeoPackage holds several outputs"),
-        (["--cleaned", "out.png"], "--cleaned writes .tif"),
-        (["--report", "out.pdf"], "--report writes .html"),
+        (["--rails", "out.shp"], "--rails can't be out.shp: let it end in .gpkg or .dxf or .csv."),
+        (["--quality", "out.tab"], "--quality can't be out.tab: let it end in .gpkg"),
+        (
+            ["--rails", "out.dxf", "--centerlines", "out.dxf"],
+            "--rails and --centerlines are the same file: give each",
+        ),
+        (["--cleaned", "out.png"], "--cleaned can't be out.png: let it end in .tif or .tiff."),
+        (["--report", "out.pdf"], "--report can't be out.pdf: let it end in .html or .htm."),
         (["--other-gauges", "1430"], "distinguished"),
         (["--other-gauges", "wide"], '--other-gauges "wide" must be millimetres'),
         (["--gauge", "300"], "gauge"),
         (["--max-gap", "-1"], "--max-gap"),
         (["--step", "0"], "--step"),
-        (["--workers", "100000"], "--workers can't be 100000: give 1000 or less."),
-        (["--iterations", "6"], "--iterations can't be 6: give 5 or less."),
+        (["--workers", "100000"], "--workers can't be 100000: give a number from 0 to 1000."),
+        (["--iterations", "6"], "--iterations can't be 6: give a number from 0 to 5."),
         (["--smoothing-xy", "0"], "--smoothing-xy"),
         (["--rail-classes", "300"], "0 to 255"),
         (["--extent", "1,2,3"], "four numbers"),
