@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import ParameterError
 from ..frpdf.models import choose as choose_model
 from ..parameters import LEARNED, STRIPS, Parameters
-from ..progress import Estimating, counted
+from ..progress import Estimating
 from ..standards import DEFAULT, SEARCHED_CLASSES
 from . import shared
 from .declaration import CLOUD_NEEDS, CLOUD_WORDS, RAIL_WORDS, TRACK_WORDS, Choice, Flag, Job, RasterOutput
@@ -125,16 +125,12 @@ def _result(values: Values, network: RailNetwork, origin: Origin) -> Result:
         **(shared.figures_of_stations(network.geometry) if _measures(values) else {}),
         "ENGINE_USED": network.engine,
     }
-    counts = (
-        f"{counted(len(lines), what)}, {sum(line.length_m for line in lines) / 1000:.3f} km"
-        for lines, what in ((network.rails, "rail"), (network.centerlines, "centerline"))
-    )
     return Result(
         figures,
         network.frame,
         {name.upper(): make for name, make in network_makers(network, origin.gauges_m).items()},
         {"REPORT": lambda: origin.report(network)},
-        (*counts, *summary(network, origin.gauges_m)),
+        summary(network, origin.gauges_m),
         ShownCloud("INPUT", _class_codes(values), origin.standard.head_width_m),
         {"CLEANED": lambda: _cleaned(values, network, origin.standard)},
         network,

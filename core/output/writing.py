@@ -24,15 +24,6 @@ LINE_M, LINE_ZM = 2002, 3002
 KINDS = {int: np.int32, float: float, str: object}
 
 
-def by_file(layers: Sequence[Layer], destinations: Mapping[str, Destination]) -> list[tuple[list[Layer], Destination]]:
-    """Group layers by the file that each goes into, given the destinations by name of the layer; for `write_layers`."""
-    groups: dict[Path, tuple[list[Layer], Destination]] = {}
-    for layer in layers:
-        destination = destinations[layer.product.name]
-        groups.setdefault(destination.file, ([], destination))[0].append(layer)
-    return list(groups.values())
-
-
 def write_layers(layers: Sequence[Layer], destination: Destination, frame: LocalFrame) -> None:
     """Write layers into one GeoPackage, whose other layers stay, or one layer into a DXF or CSV file.
 
@@ -56,12 +47,6 @@ def write_layers(layers: Sequence[Layer], destination: Destination, frame: Local
     with destination.replacing(edit=bool(tables_in(destination.file) - names)) as new:
         for layer in layers:
             _write_layer(layer, frame, new)
-
-
-def write_all(layers: Sequence[Layer], outputs: Mapping[str, Destination], frame: LocalFrame) -> None:
-    """Write layers into the GeoPackages of the outputs of their names."""
-    for same, file in by_file(layers, outputs):
-        write_layers(same, file, frame)
 
 
 def _write_for_others(layer: Layer, destination: Destination, frame: LocalFrame) -> None:

@@ -5,24 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from ...core.disk import Destination
 from ..dialog.parameter_values import ParameterValues
 from ..notices import notices
 
-if TYPE_CHECKING:
-    from ...core.rails import RailNetwork
-    from ...core.report import Origin
-
-
 REPORT = "REPORT"
 """Name of the page that a run shows."""
-
-
-def write_report(values: ParameterValues, network: RailNetwork, origin: Origin) -> dict[str, str]:
-    """Write the report on a network with its geometry; see `write_shown`."""
-    return write_shown(values, lambda: origin.report(network))
 
 
 def write_shown(values: ParameterValues, build: Callable[[], str], name: str = REPORT) -> dict[str, str]:
