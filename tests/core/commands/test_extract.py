@@ -155,7 +155,7 @@ def test_warnings_are_on_the_error_output(tiles, scheduler, tmp_path, capsys):
     assert main([*words, *scheduler]) == 0
     said = capsys.readouterr()
     assert "Warning: Class 10 has no rails" in said.err
-    assert "0 rails (0 m)" in said.out
+    assert "0 rails (0.0 m)" in said.out
 
 
 def test_rails_without_a_track_are_written_and_the_reason_is_named(tiles, scheduler, tmp_path, capsys):
