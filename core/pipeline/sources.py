@@ -12,7 +12,7 @@ import numpy as np
 
 from ..checks.standard import warn_of_gauge
 from ..classify.settings import Settings
-from ..clouds.las import CloudHeader
+from ..clouds.header import CloudHeader
 from ..clouds.points import AIRBORNE, Request, read_each
 from ..disk import writing
 from ..errors import CloudError, NoRailPointsError, RailExtractError
