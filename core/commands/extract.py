@@ -39,6 +39,7 @@ from .options import (
     add_method_arguments,
     add_outputs,
     add_tiles_argument,
+    axis_of,
     destinations_of,
     gauges_of,
     numbers_in,
@@ -228,7 +229,7 @@ def _run_in(
         request = replace(request, merged=args.merge_classes and not raw)
         wkt = request.zero.crs_wkt
         seeds = vector_module("--seeds").read_seeds(args.seeds, wkt) if args.seeds else ()
-        axes = vector_module("--axis", "kilometres").read_axes(args, None, wkt)[0] if args.axis else None
+        axes = vector_module("--axis", "kilometres").read_axes(axis_of(args), None, wkt)[0] if args.axis else None
         source: Source = Classified(request)
         if raw:
             source = Raw(request, weights) if args.classify else Grown(request, seeds)
