@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..checks.standard import warn_of_raw
 from ..classify.guide import Guide
 from ..classify.settings import Settings
 from ..clouds.crs import MAX_COORDINATE
@@ -27,7 +28,7 @@ from ..labelling.growing import grow_files
 from ..labelling.training import Plan, check_training
 from ..learned.model import weights_for
 from ..output.layers import stops_layer
-from ..parameters import DEFAULT_EPOCHS, DEFAULT_GUIDE_DISTANCE_M, GrowParameters
+from ..parameters import DEFAULT_EPOCHS, DEFAULT_GUIDE_DISTANCE_M, GrowParameters, Parameters
 from ..progress import Estimating, Progress
 from ..report.training_card import build_card, facts_of
 from ..scratch import scratch_folder
@@ -87,7 +88,8 @@ def _classify(args: argparse.Namespace) -> None:
     """Find the rail points and write the copy."""
     _check_rail_class(args)
     standard = resolve(args.standard, args.gauge, args.head_width)
-    gauges_m = tuple(gauge_m for gauge_m, _ in gauges_of(args, standard))
+    gauges = gauges_of(args, standard)
+    gauges_m = tuple(gauge_m for gauge_m, _ in gauges)
     if args.only_guided and args.guide is None:
         raise ParameterError("--only-guided needs lines to compare tracks with: give --guide.")
     choice = Choice(args.rail_class, args.rails_only, not args.no_reset)
@@ -98,7 +100,10 @@ def _classify(args: argparse.Namespace) -> None:
     guide = _guide(args, request)
     settings = Settings(gauges_m, standard.head_width_m, not args.pairs_only, guide, weights)
     with _beside(planned) as folder, runner_of(args) as runner:
-        _print(classify_files(request, settings, choice, planned, folder, runner, progress))
+        result = classify_files(request, settings, choice, planned, folder, runner, progress)
+    parameters = Parameters(standard.gauge_m, standard.head_width_m).with_gauges(gauges[1:])
+    warn_of_raw(request, result.figures, parameters, progress)
+    _print(result)
 
 
 def _guide(args: argparse.Namespace, request: Request) -> Guide | None:

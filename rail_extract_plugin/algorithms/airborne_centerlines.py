@@ -99,7 +99,7 @@ class AirborneCenterlines(RailAlgorithm):
             run = Run(request, job.parameters, folder / "points", runner, progress)
             found: Any = survey_files(run, job.guides) if job.guides else propose_guides(run)
         progress.check()
-        self.layer_properties = properties_of(job.cloud, job.class_codes, job.standard.head_width_m, found.frame)
+        self.remember(properties_of(job.cloud, job.class_codes, job.standard.head_width_m, found.frame))
         write = self._write_survey if job.guides else self._write_proposals
         return write(found, job, values, progress)
 

@@ -93,6 +93,7 @@ class ClassifyRailPoints(RailAlgorithm):
 
     def compute(self, job: Job, values: ParameterValues, progress: Progress) -> dict[str, Any]:
         """Classify the cloud and write the copy."""
+        from ...core.checks.standard import warn_of_raw
         from ...core.classify.settings import Settings
         from ...core.labelling.files import Choice, classify_files, plan_output
         from ...core.labelling.finding import guide_of
@@ -108,6 +109,7 @@ class ClassifyRailPoints(RailAlgorithm):
         settings = Settings(gauges_m, job.standard.head_width_m, values.flag("KEEP_SINGLE"), guide, job.weights)
         with points_folder() as folder, values.runner() as runner:
             result = classify_files(request, settings, choice, output, folder, runner, progress)
+        warn_of_raw(request, result.figures, values.settings(job.standard, job.other_gauges), progress)
         return classified_results(result.file, result.point_count, result.figures)
 
 

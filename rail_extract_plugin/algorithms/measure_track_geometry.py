@@ -134,7 +134,7 @@ class MeasureTrackGeometry(RailAlgorithm):
             measured = job.axes.along(measured, frame, progress)
         if job.cloud:
             codes = tuple(cloud.class_code for cloud in tracks.clouds)
-            self.layer_properties = properties_of(job.cloud, codes, job.head_width_m, frame)
+            self.remember(properties_of(job.cloud, codes, job.head_width_m, frame))
         centerlines = with_measured_gauge(tracks.centerlines, measured)
         network = RailNetwork(tuple(rails), centerlines, frame, geometry=measured, warnings=progress.warnings)
         paths = job.cloud.paths if job.cloud else (Path(lines[0].sourceName()),)

@@ -222,7 +222,7 @@ def cleanup() -> Definitions:
         ),
         advanced(
             choice("ENGINE", "Engine of the network", ENGINES, Parameters.engine),
-            "Python package that runs the network: PyTorch or OpenCV. AUTO uses the faster of those installed.",
+            "Python package that runs the network: PyTorch or OpenCV. AUTO uses PyTorch if it is installed.",
         ),
         advanced(
             choice("DEVICE", "Device of the network", DEVICES, Parameters.device),

@@ -6,6 +6,7 @@ QGIS imports this module when it shows a dialog; nothing else may, because there
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 from processing.gui.AlgorithmDialog import AlgorithmDialog
@@ -13,10 +14,12 @@ from processing.gui.ParametersPanel import ParametersPanel
 from qgis.core import (
     Qgis,
     QgsApplication,
+    QgsPointCloudLayer,
     QgsProcessingAlgorithm,
     QgsProcessingContext,
     QgsProcessingFeedback,
     QgsProcessingParameterDefinition,
+    QgsProject,
 )
 from qgis.PyQt import sip
 from qgis.PyQt.QtWidgets import (
@@ -36,6 +39,7 @@ from ..dialog.wheel import ignore_wheel
 from ..dialog.wording import with_labels
 from ..links import LinkFollower, links
 from ..notices import notices
+from ..paths import is_sample
 from .help_pictures import PictureFitter
 from .next_steps import Step, after_failure, after_success
 
@@ -91,11 +95,9 @@ class RunDialog(AlgorithmDialog):
         self.after_run(successful, result, context)
 
     def after_run(self, successful: bool, results: dict[str, Any], context: QgsProcessingContext) -> None:
-        """Keep the standard that was run with, and offer what may follow."""
-        standard = self.mainWidget().wrappers.get("STANDARD")
-        if standard is not None:
-            standard.remember()
+        """Keep the standard that succeeded, unless that was a demonstration, and offer what may follow."""
         if successful:
+            self._remember()
             steps = list(after_success(self, results, context, self._standard))
         else:
             steps = list(after_failure(self, self._failure, self._standard))
@@ -106,11 +108,30 @@ class RunDialog(AlgorithmDialog):
             self.setInfo(f"<b>{'Next:'}</b> {offered}", escapeHtml=False)
         self._failure, self._standard = None, ""
 
+    def go_on(self, name: str, values: dict[str, Any]) -> None:
+        """Open the dialog of another algorithm that goes on with the results of this one."""
+        self._next = open_dialog(name, values, self.parentWidget())
+
+    def cloud_layer(self, path: str) -> str:
+        """Show a cloud that the run has written, if this QGIS can; returns the id of the layer, or else the path."""
+        layer = QgsPointCloudLayer(path, Path(path).stem, "vpc" if path.endswith(".vpc") else "pdal")
+        if not layer.isValid():
+            return path
+        return QgsProject.instance().addMapLayer(layer).id()
+
+    def _remember(self) -> None:
+        """Keep the standard for the next dialog."""
+        wrappers = self.mainWidget().wrappers
+        if "STANDARD" in wrappers and not ("INPUT" in wrappers and _is_of_sample(wrappers["INPUT"].parameterValue())):
+            wrappers["STANDARD"].remember()
+
     def _offer(self, step: Step) -> None:
         """Offer a step in the message bar."""
         button = QPushButton(step.text)
         button.clicked.connect(self._step(step))
-        self.messageBar().pushWidget(button, Qgis.MessageLevel.Warning, 0)
+        item = self.messageBar().createMessage("", step.why)
+        item.layout().addWidget(button)
+        self.messageBar().pushWidget(item, Qgis.MessageLevel.Warning, 0)
 
     def _step(self, step: Step) -> Callable[..., None]:
         """Return a function that takes a step, unless the dialog is gone or at work."""
@@ -162,6 +183,12 @@ class _Panel(ParametersPanel):
             self._layouts[section_of(parameter.name())].addWidget(widget, stretch)
         else:
             super().addParameterWidget(parameter, widget, stretch)
+
+
+def _is_of_sample(value: Any) -> bool:
+    """Return whether the value of an input is the sample: its path, or a layer of it."""
+    layer = QgsProject.instance().mapLayer(value) if isinstance(value, str) else None
+    return is_sample(layer.source() if layer is not None else str(value or ""))
 
 
 def _heading(title: str) -> QLabel:
