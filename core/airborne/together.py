@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import block_diag, csr_matrix, vstack
 
-from .axis import Axis
+from ..polyline import Polyline, cross
 from .curve import differences, smooth
 from .joint import parallel
 from .sections import STATION_M, Sections
@@ -79,7 +79,7 @@ class Curve:
     beside: np.ndarray
 
 
-def draw_together(lines: Sequence[Axis], found: Sequence[Sections]) -> list[Curve]:
+def draw_together(lines: Sequence[Polyline], found: Sequence[Sections]) -> list[Curve]:
     """Draw the curves of tracks through their sections.
 
     How much curvature and distance change is measured along the tracks (expectation maximisation of the variance of the
@@ -87,12 +87,13 @@ def draw_together(lines: Sequence[Axis], found: Sequence[Sections]) -> list[Curv
 
     Parameters
     ----------
-    lines : sequence of Axis
+    lines : sequence of Polyline
         On which the sections are seen.
     found : sequence of Sections
     """
     stations = [one.stations_on(line) for line, one in zip(lines, found)]
-    place, normal = (np.concatenate(one) for one in zip(*(line.at(t) for line, t in zip(lines, stations))))
+    place = np.concatenate([line.at(t) for line, t in zip(lines, stations)])
+    normal = np.concatenate([line.left_at(t) for line, t in zip(lines, stations)])
     shows, offset, sigma = (
         np.concatenate([getattr(one, name) for one in found]) for name in ("shows", "offset", "sigma")
     )
@@ -135,7 +136,7 @@ class _Stiffness:
     blocks: list[tuple[int, float, int]]
 
     @classmethod
-    def of(cls, lines: Sequence[Axis], stations: Sequence[np.ndarray]) -> _Stiffness:
+    def of(cls, lines: Sequence[Polyline], stations: Sequence[np.ndarray]) -> _Stiffness:
         """Set up the differences at the stations of lines."""
         own = [differences(len(t), 3) for t in stations]
         apart = list(_distances(lines, stations))
@@ -161,7 +162,7 @@ class _Stiffness:
         return np.cumsum([rows for rows, _, _ in self.blocks])[:-1]
 
 
-def _distances(lines: Sequence[Axis], stations: Sequence[np.ndarray]) -> Iterator[csr_matrix]:
+def _distances(lines: Sequence[Polyline], stations: Sequence[np.ndarray]) -> Iterator[csr_matrix]:
     """Yield the second differences of the distance between each two parallel lines, over the stations of all."""
     first = np.cumsum([0, *map(len, stations)])
     for one in range(len(lines)):
@@ -183,15 +184,14 @@ def _distances(lines: Sequence[Axis], stations: Sequence[np.ndarray]) -> Iterato
                 yield (differences(count, 2) @ across)[whole]
 
 
-def _feet(line: Axis, t: np.ndarray, other: Axis) -> tuple[np.ndarray, np.ndarray]:
+def _feet(line: Polyline, t: np.ndarray, other: Polyline) -> tuple[np.ndarray, np.ndarray]:
     """Return at which stations of a line another one is parallel, (n,) bool, and its chainages there, (n,)."""
-    place, normal = line.at(t)
+    place, normal = line.at(t), line.left_at(t)
     near, feet, _ = parallel(place, normal, other)
     for _ in range(FOOT_ROUNDS):
-        beside, left = other.at(feet)
-        ahead = np.column_stack([left[:, 1], -left[:, 0]])
-        feet = feet + ((place - beside) * ahead).sum(axis=1)
-    return near & (np.abs((normal * ahead).sum(axis=1)) < TURNED), feet
+        left = other.left_at(feet)
+        feet = feet + cross(place - other.at(feet), left)
+    return near & (np.abs(cross(normal, left)) < TURNED), feet
 
 
 def _interpolation(t: np.ndarray, stations: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -245,7 +245,7 @@ def measure_again(
         In the order given. A rail without points keeps its heights and is a gap from end to end.
     """
     plans = [resample(rail.xyz[:, :2], KNOT_M)[0] for rail in rails]
-    near = near_lines(plans, points.xyz, head_width_m, points.strips, progress.span(0.0, 0.7))
+    near = near_lines(plans, points.xyz, head_width_m, points.strips, progress.span(0.0, 0.7), points.blunt)
     measured = []
     for rail, head in zip(rails, progress.span(0.7, 1.0).follow(near)):
         # Lines from a file are only known to be on their heads, so the head width takes the place of the cell size.

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...core.comparison.pieces import cut, nearest
+from ...core.comparison.pieces import cut
 
 
 @dataclass(frozen=True)
@@ -159,16 +159,16 @@ def match(extracted: Sequence[np.ndarray], truth: Sequence[np.ndarray]) -> Match
     if not len(true.start):
         nothing = np.full(len(lines.start), np.inf)
         back = Offsets(nothing, nothing, nothing, lines.lengths)
-        return Match(back.within(0.0), back, lines.number, lines.t, len(extracted), 0)
+        return Match(back.within(0.0), back, lines.number, lines.middle_t, len(extracted), 0)
     if not len(lines.start):
         nothing = np.full(len(true.start), np.inf)
         there = Offsets(nothing, nothing, nothing, true.lengths)
-        return Match(there, there.within(0.0), lines.number, lines.t, len(extracted), len(truth))
-    feet, _ = nearest(true.middle, lines)
+        return Match(there, there.within(0.0), lines.number, lines.middle_t, len(extracted), len(truth))
+    feet, _ = lines.nearest(true.middle)
     there = Offsets.between(true.middle, feet, true.left, true.lengths)
-    feet, piece = nearest(lines.middle, true)
-    back = Offsets.between(feet, lines.middle, true.left[piece], lines.lengths)
-    return Match(there, back, lines.number, lines.t, len(extracted), len(truth))
+    feet, chord = true.nearest(lines.middle)
+    back = Offsets.between(feet, lines.middle, true.left[chord], lines.lengths)
+    return Match(there, back, lines.number, lines.middle_t, len(extracted), len(truth))
 
 
 def _worse(a: float, b: float) -> float:
