@@ -48,8 +48,8 @@ LITTLE_M = 2 * RAW_SQUARE_M
 """Length of rails with a partner below which the gauge may be another one: that of a track through one square."""
 
 MANY_TIMES = 2.0
-"""How many times as much rail another gauge shows, in these squares alone, if it is the right one: at a wrong gauge, ties
-and sides of the track make pairs of a few metres."""
+"""How many times as much rail another gauge shows, in these squares alone, if it is the right one: at a wrong gauge,
+ties and sides of the track make pairs of a few metres."""
 
 RAW_HEAD_M = 0.070
 """Width of a head that differs by less than 13 mm from that of any standard: heads are found 25 mm wider as well."""
@@ -127,10 +127,11 @@ def _found_at_any_gauge(request: Request, progress: Progress) -> tuple[np.ndarra
     xyz, census = request.sample(RAW_SAMPLE_POINTS)
     if not len(xyz):
         raise request.explain_none(census)
-    corners = np.floor(xyz[:, :2] / RAW_SQUARE_M).astype(np.int64)
+    zero = np.median(xyz[:, :2], axis=0) - RAW_SQUARE_M / 2  # so that no border follows a straight track
+    corners = np.floor((xyz[:, :2] - zero) / RAW_SQUARE_M).astype(np.int64)
     keys, square, counts = np.unique(corners, axis=0, return_inverse=True, return_counts=True)
     fullest = np.argsort(-counts, kind="stable")[:RAW_SQUARES]
-    squares = [(np.append(RAW_SQUARE_M * keys[one], 0.0), xyz[square.ravel() == one]) for one in fullest]
+    squares = [(np.append(zero + RAW_SQUARE_M * keys[one], 0.0), xyz[square.ravel() == one]) for one in fullest]
     best_m, best = 0.0, np.empty((0, 3))
     for gauge_m in progress.follow(_plausible_gauges()):
         found = _found(squares, Settings((gauge_m,), RAW_HEAD_M))
