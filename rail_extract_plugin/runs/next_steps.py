@@ -17,6 +17,7 @@ from ...core.standards import STANDARDS
 from ..notices import notices
 from ..setup.dependencies import INSTALL
 from ..writing.bundle import move_to, save_all
+from .preview import name_preview
 
 if TYPE_CHECKING:
     from .run_dialog import RunDialog
@@ -49,14 +50,19 @@ def after_failure(dialog: RunDialog, failure: type | None, standard: str) -> Ite
 
 
 def after_success(
-    dialog: RunDialog, results: dict[str, Any], context: QgsProcessingContext, standard: str
+    dialog: RunDialog, results: dict[str, Any], context: QgsProcessingContext, standard: str, is_preview: bool = False
 ) -> Iterator[Step]:
-    """Yield what to do with the results of a run; see `after_failure`."""
+    """Yield what to do with the results of a run, or of a preview; see `after_failure`."""
     yield from _with_other_standard(dialog, standard)
     algorithm = dialog.algorithm()
     if algorithm.name() == INSTALL and algorithm.provider().algorithm("extractrails").canExecute()[0]:
         yield Step("Open the sample…", notices.sample_wanted.emit)
     layers = _layers([one.name() for one in algorithm.destinationParameterDefinitions()], results, context)
+    if is_preview:
+        for layer in list(layers.values())[:1]:
+            name_preview(layer)
+        yield Step("Run on all that is chosen", _again(dialog))
+        return
     yield from _in_other_dialogs(dialog, layers, results)
     if "FINDINGS" in layers and layers["FINDINGS"].featureCount():
         findings = layers["FINDINGS"].id()

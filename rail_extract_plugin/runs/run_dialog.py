@@ -32,7 +32,9 @@ from qgis.PyQt.QtWidgets import (
     QVBoxLayout,
     QWidget,
 )
+from qgis.utils import iface
 
+from ...core.errors import RailExtractError
 from ..dialog.help_panel import ADVANCED
 from ..dialog.sections import OTHERS, RESULTS, SECTIONS, section_of
 from ..dialog.wheel import ignore_wheel
@@ -40,8 +42,12 @@ from ..dialog.wording import with_labels
 from ..links import LinkFollower, links
 from ..notices import notices
 from ..paths import is_sample
+from . import preview
 from .help_pictures import PictureFitter
 from .next_steps import Step, after_failure, after_success
+
+EXTRACT = "extractrails"
+"""Algorithm that a part of the cloud may be tried with."""
 
 
 class RunDialog(AlgorithmDialog):
@@ -59,13 +65,56 @@ class RunDialog(AlgorithmDialog):
         self._follower = LinkFollower(self.findChild(QTextEdit, "txtLog"))
         self._fitter = PictureFitter(self.findChild(QTextBrowser, "textShortHelp"))
         self._failure: type | None = None
+        self._is_preview = False
         self._standard = ""
+        self._part = ""
+        self._try_button: QPushButton | None = None
+        if algorithm.name() == EXTRACT:
+            self._try_button = QPushButton(preview.TEXT)
+            self._try_button.setToolTip(preview.TIP)
+            self._try_button.clicked.connect(lambda: self.try_part())
+            self.buttonBox().addButton(self._try_button, QDialogButtonBox.ButtonRole.ResetRole)
         notices.run_failed.connect(self._note_failure)
         notices.standard_proposed.connect(self._note_standard)
 
     def getParametersPanel(self, alg: QgsProcessingAlgorithm, parent: QWidget) -> ParametersPanel:
         """Return the fields; `AlgorithmDialog` asks for them."""
         return _Panel(parent, alg, self.in_place, self.active_layer)
+
+    def try_part(self) -> None:
+        """Run on the part of the cloud that the map shows."""
+        try:
+            cloud = self.mainWidget().wrappers["INPUT"].parameterValue()
+            self._part = preview.visible_part(cloud, iface.mapCanvas())
+        except RailExtractError as error:
+            self.messageBar().pushMessage("", str(error), Qgis.MessageLevel.Warning, 0)
+            return
+        self.run_again({})
+        self._part = ""  # the run has its values
+
+    def createProcessingParameters(self, *given: Any) -> dict[str, Any]:
+        """Return the values of the fields, limited to the part that is tried; `AlgorithmDialog` asks for them."""
+        values = super().createProcessingParameters(*given)
+        outputs = [one.name() for one in self.algorithm().destinationParameterDefinitions()]
+        return preview.limited(values, outputs, self._part) if self._part else values
+
+    def runAlgorithm(self) -> None:
+        """Begin a run; the lines of an earlier preview go."""
+        preview.drop_previews()
+        self._is_preview = bool(self._part)
+        super().runAlgorithm()
+
+    def blockAdditionalControlsWhileRunning(self) -> None:
+        """Disable what would begin another run."""
+        super().blockAdditionalControlsWhileRunning()
+        if self._try_button is not None:
+            self._try_button.setEnabled(False)
+
+    def resetAdditionalGui(self) -> None:
+        """Enable it again."""
+        super().resetAdditionalGui()
+        if self._try_button is not None:
+            self._try_button.setEnabled(True)
 
     def run_again(self, changes: dict[str, Any]) -> None:
         """Run with other values, as if the user had filled them in."""
@@ -96,9 +145,9 @@ class RunDialog(AlgorithmDialog):
 
     def after_run(self, successful: bool, results: dict[str, Any], context: QgsProcessingContext) -> None:
         """Keep the standard that succeeded, unless that was a demonstration, and offer what may follow."""
-        if successful:
+        if successful and not self._is_preview:
             self._remember()
-            steps = list(after_success(self, results, context, self._standard))
+            steps = list(after_success(self, results, context, self._standard, self._is_preview))
         else:
             steps = list(after_failure(self, self._failure, self._standard))
             for step in steps:

@@ -463,6 +463,40 @@ def onwards(driver: Driver) -> Iterator:
     driver.picture("onwards_stations")
 
 
+def tried(driver: Driver) -> Iterator:
+    """Try a part of the sample without a map, another one that the map shows, and then run on all of it."""
+    yield from install(ARCHIVE)
+    dialog = yield from open_dialog("extractrails")
+    rails = str(driver.folder / "rails.gpkg")
+    dialog.setParameters({"INPUT": SAMPLE, "RAILS": rails, "STANDARD": PART["STANDARD"], "ITERATIONS": 1})
+    button = next(one for one in dialog.buttonBox().buttons() if "visible" in one.text())
+    for name in ("without a map", "in the map"):
+        later(button.click)
+        yield lambda: not button.isEnabled()
+        yield button.isEnabled
+        yield 1.0
+        driver.picture(f"tried {name}")
+        driver.keep(name, _groups())
+        (layer,) = [one for one in QgsProject.instance().mapLayers().values() if one.name().startswith("Rails")]
+        driver.keep(f"extent {name}", layer.extent().toRectF().getCoords())
+        iface.mapCanvas().setExtent(QgsRectangle.fromCenterAndSize(layer.extent().center(), 20, 20))
+        iface.mapCanvas().refresh()
+        yield 1.0
+    log = dialog.findChild(QTextEdit, "txtLog")
+    driver.keep("offered", log.toPlainText().splitlines()[-1])
+    driver.keep("file", Path(rails).exists())
+    other = yield from open_dialog("rasterizerailpoints")
+    driver.keep("standard", other.mainWidget().wrappers["STANDARD"].value())
+    yield from close(other)
+    dialog.setParameters({"EXTENT": PART["EXTENT"]})
+    _follow(log, "Run on all")
+    yield lambda: not button.isEnabled()
+    yield button.isEnabled
+    yield 1.0
+    driver.keep("at last", _groups())
+    yield from close(dialog)
+
+
 def _menu(text: str) -> QAction:
     """Return an entry of the plugin's menu."""
     menu = next(one for one in iface.pluginMenu().actions() if one.text() == "Rail Extract").menu()

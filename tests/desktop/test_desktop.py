@@ -9,7 +9,7 @@ from osgeo import gdal, ogr
 
 SCENARIOS = (
     *("dialogs", "wheel", "unload", "raw", "missing", "rails", "welcome"),
-    *("review", "reopened", "again", "onwards", "growing", "batch", "model"),
+    *("review", "reopened", "again", "tried", "onwards", "growing", "batch", "model"),
 )
 
 DIES_AT_EXIT = ("rails", 340)
@@ -290,6 +290,20 @@ def test_batch_writes_what_is_named_and_skips_what_is_blank(run_scenario):
     assert "Batch execution completed" in session["log"]
     assert session["files"] == ["RAILS0.gpkg", "RAILS1.gpkg", "REPORT0.html", "REPORT1.html"]
     assert session["layers"] == ["RAILS0", "RAILS1"]
+
+
+def test_a_part_is_tried_and_nothing_of_it_is_kept(run_scenario):
+    session = run_scenario("tried")
+    preview = {"Preview of Extract rails: sample": ["Track centerlines: sample", "Rails: sample"]}
+    assert session["without a map"] == session["in the map"] == preview
+    west, south, east, north = session["extent without a map"]
+    assert 40 < max(east - west, north - south) <= 101
+    west, south, east, north = session["extent in the map"]
+    assert 10 < max(east - west, north - south) < 60
+    assert session["offered"] == "Next: Run on all that is chosen"
+    assert (session["file"], session["standard"]) == (False, "EN_60E1_1435")
+    (run,) = session["at last"]
+    assert run == "Extract rails: sample"
 
 
 def test_a_failed_batch_leaves_no_task(run_scenario):
