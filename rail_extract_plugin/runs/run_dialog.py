@@ -147,6 +147,7 @@ class RunDialog(AlgorithmDialog):
         """Keep the standard that succeeded, unless that was a demonstration, and offer what may follow."""
         if successful and not self._is_preview:
             self._remember()
+        if successful:
             steps = list(after_success(self, results, context, self._standard, self._is_preview))
         else:
             steps = list(after_failure(self, self._failure, self._standard))
