@@ -33,6 +33,7 @@ from ...core.design_places import check_line, check_places, has_stray
 from ...core.errors import CrsError, MissingError, RailExtractError
 from ...core.fields import CENTERLINE_FIELDS, RAIL_FIELDS, Field
 from ...core.frame import ORIGIN_STEP, LocalFrame
+from ...core.jobs.values import Rows
 from ...core.polyline import length_along
 from ...core.progress import SILENT, Progress
 from ...core.rails import NO_GAPS, SAME_SUM_M, Centerline, RailLine
@@ -113,6 +114,14 @@ def read_surveyed(
     names = source.fields().names()
     id_field = next((one for one in ("rail_id", "track_id") if one in names), "")
     return tuple(_surveyed(feature, xyz, id_field) for feature, xyz in found), frame
+
+
+def rows_of(source: QgsProcessingFeatureSource, progress: Progress = SILENT) -> Rows:
+    """Return the values of the features by the name of the field, None where one is empty, and all names."""
+    names = source.fields().names()
+    features = progress.follow(source.getFeatures(QgsFeatureRequest(), GEOMETRY_AS_IT_IS), source.featureCount())
+    table = [dict(zip(names, feature.attributes())) for feature in features]
+    return [{name: None if value == NULL else value for name, value in row.items()} for row in table], names
 
 
 def read_guide(

@@ -18,7 +18,7 @@ from qgis.core import (
     QgsProperty,
 )
 
-from ..reading.clouds import CloudSource
+from ...core.jobs.clouds import CloudSource
 
 if TYPE_CHECKING:
     from ...core.frame import LocalFrame
