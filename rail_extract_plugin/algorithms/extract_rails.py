@@ -127,7 +127,7 @@ class ExtractRails(RailAlgorithm):
         for failure in network.failures:
             progress.warning(failure)
         origin = Origin(job.cloud.paths, job.standard, job.other_gauges, job.command, settings)
-        self.layer_properties = properties_of(job.cloud, job.class_codes, job.standard.head_width_m, network.frame)
+        self.remember(properties_of(job.cloud, job.class_codes, job.standard.head_width_m, network.frame))
         for sentence in summary(network, origin.gauges_m):
             progress.info(sentence)
         written = self._write(job, network, origin, values)
