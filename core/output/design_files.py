@@ -24,7 +24,7 @@ _OF_FIT = "how well the elements fit the measured track: deviations and standard
 LEFT_OUT = {
     "LandXML": _OF_FIT,
     "IFC": _OF_FIT,
-    "DXF": "the coordinate system, stations and deviations, nor elements as such: curves are polylines, texts name them",
+    "DXF": "the coordinate system, stations and deviations, nor elements: curves are polylines, and texts name them",
 }
 """What the element table has and a file of a format has not."""
 
