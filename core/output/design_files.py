@@ -74,7 +74,6 @@ def write_designs(
 
     Parameters
     ----------
-    path : Path
     alignments : sequence of Alignment
     standard : RailStandard
         Gauge and railhead width give the distance across which cant is measured.
@@ -82,7 +81,6 @@ def write_designs(
         Whether curves of the profile are circles in LandXML; else they are parabolas.
     version : str
         Of this program.
-    progress : Progress
     """
     kind = FORMATS[path.suffix.lower()]
     wkt = alignments[0].frame.crs_wkt
@@ -117,7 +115,6 @@ def check_place(name: str, frame: LocalFrame, east_first: bool, progress: Progre
         Of its alignments, with the coordinate system.
     east_first : bool
         Whether the points were read as easting and northing.
-    progress : Progress
 
     Raises
     ------
