@@ -16,8 +16,8 @@ from ..parameters import OVERLAP, SYNTHETIC
 from ..progress import Progress
 from . import laz
 from .crs import MAX_COORDINATE, crs_of_geokeys, import_pyproj
+from .header import CloudHeader, Extent, Part
 from .passes import marks_of
-from .readers import CloudHeader, Extent, Part
 
 with warnings.catch_warnings():
     # In a virtual environment, pyproj (imported by laspy) warns about a data folder that PROJ finds by itself.

@@ -21,7 +21,7 @@ import numpy as np
 
 from ..errors import CloudError
 from ..progress import SILENT, Progress
-from .readers import Extent
+from .header import Extent
 
 if TYPE_CHECKING:
     import laspy

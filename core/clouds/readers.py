@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import errno
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
 from typing import Union
@@ -14,7 +13,8 @@ import numpy as np
 
 from ..errors import Cancelled, CloudError, EmptyCloudError, RailExtractError
 from ..progress import SILENT, Progress
-from .vpc import Extent, list_tiles
+from .header import CloudHeader, Extent
+from .vpc import list_tiles
 
 SUFFIXES = (".las", ".laz")
 """Suffixes of files that are read. COPC files end in .copc.laz."""
@@ -41,35 +41,11 @@ points read by class (256,), kept or not."""
 Points = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 """Coordinates (n, 3) in units of the CRS, classes (n,), marks (n,), and which points are not withheld, (n,) bool."""
 
-Part = tuple[Callable[[Union[np.ndarray, slice]], np.ndarray], np.ndarray, np.ndarray, np.ndarray, bool]
-"""A chunk of points: a function that returns the coordinates (k, 3) of some of them, classes (n,), marks (n,) and which
-are valid (n,) bool, as in `Points`, and whether the file is read as a whole."""
-
 WILDCARDS = "*?"
 """Characters of patterns such as tiles/2024_*.laz, which not every shell replaces with the names of files."""
 
 Paths = Union[str, Path, Sequence[Union[str, Path]]]
 """Files, or folders of them."""
-
-
-@dataclass(frozen=True)
-class CloudHeader:
-    """What the header of a file states.
-
-    Attributes
-    ----------
-    path : Path
-    point_count : int
-    extent : tuple of float
-        Smallest x, smallest y, largest x, largest y in units of the CRS.
-    crs_wkt : str or None
-        Coordinate system as WKT 2; None if the file states none that PROJ understands.
-    """
-
-    path: Path
-    point_count: int
-    extent: Extent
-    crs_wkt: str | None
 
 
 def read_header(path: Path) -> CloudHeader:

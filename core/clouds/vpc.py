@@ -8,9 +8,7 @@ from collections.abc import Iterable
 from pathlib import Path, PurePosixPath
 
 from ..errors import CloudError
-
-Extent = tuple[float, float, float, float]
-"""Smallest x, smallest y, largest x, largest y, in units of the CRS."""
+from .header import Extent
 
 
 def list_tiles(catalogue: Path) -> tuple[Path, ...]:

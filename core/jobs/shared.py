@@ -282,7 +282,7 @@ CLEANUP: tuple[Parameter, ...] = (
     Choice(
         "ENGINE",
         "Engine of the network",
-        "Python package that runs the network: PyTorch or OpenCV. AUTO uses the faster of those installed.",
+        "Python package that runs the network: PyTorch or OpenCV. AUTO uses PyTorch if it is installed.",
         advanced=True,
         options=ENGINES,
         default=Parameters.engine,

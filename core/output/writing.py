@@ -31,7 +31,6 @@ def write_layers(layers: Sequence[Layer], destination: Destination, frame: Local
     ----------
     layers : sequence of Layer
         Only the first of them goes into a DXF or CSV file.
-    destination : Destination
     frame : LocalFrame
         Local frame of the layers.
 

@@ -10,9 +10,9 @@ from typing import Protocol
 
 import numpy as np
 
-from ..checks.standard import warn_of_gauge
+from ..checks.standard import warn_of_gauge, warn_of_raw
 from ..classify.settings import Settings
-from ..clouds.las import CloudHeader
+from ..clouds.header import CloudHeader
 from ..clouds.points import AIRBORNE, Request, read_each
 from ..disk import writing
 from ..errors import CloudError, NoRailPointsError, RailExtractError
@@ -92,18 +92,31 @@ class Raw:
     @contextmanager
     def sort(self, folder: Path, parameters: Parameters, runner: Runner, progress: Progress) -> Iterator[SortedPoints]:
         """See `Source`; the points become those of `RAIL_CLASS`."""
-        settings = Settings(parameters.gauges_m, parameters.head_width_m, weights=self.weights)
-        census, figures, side_m = Census(), SearchFigures(), square_side(parameters)
+        census, side_m = Census(), square_side(parameters)
         with scratch_folder(folder) as sorted_points:
-            with writing(sorted_points), scratch_folder(sorted_points) as squares:
-                for found in find_rail_points(self.request, settings, squares, runner, progress):
-                    census.add(RAIL_CLASS, found.xyz, found.marks, self.request.zero, side_m, sorted_points)
-                    figures += found.figures
-            if not figures.points:
-                raise self._nothing_found(runner.failures)
-            report(figures, self.request, progress)
+            try:
+                figures = self._find(census, side_m, sorted_points, parameters, runner, progress)
+            except NoRailPointsError:
+                warn_of_raw(self.request, SearchFigures(), parameters, progress)
+                raise
+            is_warned = warn_of_raw(self.request, figures, parameters, progress)
             points = _gathered(self.request, side_m, sorted_points, census, figures)
-            yield replace(points, only_pairs=True)
+            yield replace(points, only_pairs=True, is_warned=is_warned)
+
+    def _find(
+        self, census: Census, side_m: float, folder: Path, parameters: Parameters, runner: Runner, progress: Progress
+    ) -> SearchFigures:
+        """Find the points on rails and add them to those of the squares."""
+        settings = Settings(parameters.gauges_m, parameters.head_width_m, weights=self.weights)
+        figures = SearchFigures()
+        with writing(folder), scratch_folder(folder) as squares:
+            for found in find_rail_points(self.request, settings, squares, runner, progress):
+                census.add(RAIL_CLASS, found.xyz, found.marks, self.request.zero, side_m, folder)
+                figures += found.figures
+        if not figures.points:
+            raise self._nothing_found(runner.failures)
+        report(figures, self.request, progress)
+        return figures
 
     def _nothing_found(self, failures: Sequence[str]) -> RailExtractError:
         if failures:

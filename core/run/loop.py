@@ -7,6 +7,7 @@
 from __future__ import annotations
 
 import pickle  # nosec B403 - reads what this process has just written
+import traceback
 from collections import Counter, deque
 from collections.abc import Callable, Hashable, Iterator, Mapping
 from contextlib import suppress
@@ -26,6 +27,9 @@ Message = TypeVar("Message")
 
 CHECK_EVERY_S = 0.1
 """Interval at which cancellation is checked while others compute."""
+
+NOTES = "__notes__"
+"""What Python 3.11 and newer write below a traceback: here, that of the worker process, which is not sent itself."""
 
 ENDING = (Cancelled, DiskError, KeyboardInterrupt, SystemExit)
 """Errors that end every run."""
@@ -70,12 +74,15 @@ class Heard(Progress):
 
 
 def _sendable(error: BaseException) -> BaseException:
-    """Return an error, or one that says the same if it can't be pickled or made again."""
-    try:
-        pickle.loads(pickle.dumps(error))  # nosec B301
-        return error
-    except Exception:
-        return RuntimeError(f"{type(error).__name__}: {error}")
+    """Return an error with its traceback as a note, or one that says the same if it can't be pickled or made again."""
+    text = "".join(traceback.format_exception(type(error), error, error.__traceback__))
+    again = RuntimeError(f"{type(error).__name__}: {error}")
+    for one in (error, again):
+        with suppress(Exception):
+            setattr(one, NOTES, [f"In a worker process:\n{text}"])
+            pickle.loads(pickle.dumps(one))  # nosec B301
+            return one
+    return again
 
 
 def next_of(messages: SimpleQueue[Message], progress: Progress) -> Message:

@@ -47,7 +47,7 @@ class FrpdfCleanup(RailAlgorithm):
     def compute(self, job: Job, values: ParameterValues, progress: Progress) -> dict[str, Any]:
         """Clean each band, then write the file."""
         from ...core.frpdf.cleanup import clean
-        from ...core.frpdf.engine import make_engine
+        from ...core.frpdf.engines import make_engine
         from ...core.frpdf.weights import load_arrays
         from ..reading.geotiff import read_rasters
 

@@ -23,7 +23,7 @@ from qgis.core import (
 from rail_extract.core import pipeline
 from rail_extract.core.disk import Destination
 from rail_extract.core.errors import RailExtractError
-from rail_extract.core.frpdf import engine, models
+from rail_extract.core.frpdf import engines, models
 from rail_extract.core.run import processes, worker
 from rail_extract.rail_extract_plugin.algorithms import base
 from rail_extract.rail_extract_plugin.dialog import parameter_values
@@ -43,7 +43,7 @@ def without(*modules):
 
     def prepare(bench):
         find_spec = dependencies.find_spec
-        for module in (dependencies, engine):
+        for module in (dependencies, engines):
             bench.patch.setattr(module, "find_spec", lambda name: None if name in modules else find_spec(name))
         return cloud(bench)
 
@@ -227,7 +227,7 @@ def divided(bench):
 
 
 def ended_workers(bench):
-    """The system ends a worker process, as Linux does if memory is short."""
+    """The system ends worker processes, as Linux does if memory is short."""
     bench.patch.setattr(worker.Worker, "send", lambda self, *task: os.kill(self.number, signal.SIGKILL))
     return divided(bench)
 
@@ -248,7 +248,7 @@ class Panic(BaseException):
 
 FAULTS = {
     "extractrails": {
-        "a worker process is ended from outside": ended_workers,
+        "every worker process is ended from outside": ended_workers,
         "worker processes cannot be started": unknown_interpreter,
         "missing package laspy": without("laspy"),
         "missing package of the chosen engine": without_engine,

@@ -7,17 +7,18 @@ import cv2
 import numpy as np
 import pytest
 from rail_extract.core.errors import Cancelled, ModelError
-from rail_extract.core.frpdf import cleanup
+from rail_extract.core.frpdf import cleanup, engines
 from rail_extract.core.frpdf import engine as engine_module
 from rail_extract.core.frpdf.corridor import Piece, lay_fields
-from rail_extract.core.frpdf.engine import MAX_PIECE_CELLS, Engine, Step, make_engine
+from rail_extract.core.frpdf.engine import MAX_PIECE_CELLS, Engine, Step
+from rail_extract.core.frpdf.engines import make_engine
 from rail_extract.core.progress import SILENT, Progress
 from rail_extract.core.raster import RailRaster
 
 
 @pytest.fixture
 def without_torch(monkeypatch):
-    monkeypatch.setattr(engine_module, "find_spec", lambda name: None if name == "torch" else find_spec(name))
+    monkeypatch.setattr(engines, "find_spec", lambda name: None if name == "torch" else find_spec(name))
 
 
 def test_opencv_runs_where_pytorch_is_not_installed(random_arrays, without_torch):
@@ -36,7 +37,7 @@ def test_pytorch_runs_where_it_is_installed(random_arrays):
 
 def test_opencv_replaces_a_pytorch_that_does_not_start(random_arrays, monkeypatch):
     found = find_spec("cv2")
-    monkeypatch.setattr(engine_module, "find_spec", lambda name: found)  # as if installed
+    monkeypatch.setattr(engines, "find_spec", lambda name: found)  # as if installed
     monkeypatch.setitem(sys.modules, "rail_extract.core.frpdf.torch_engine", None)  # its import fails
     assert make_engine(random_arrays).description.startswith("OpenCV")
     for asked in (("TORCH", "AUTO"), ("AUTO", "CUDA")):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from rail_extract.core.clouds.points import RailPoints, read_rail_points
 from rail_extract.core.frpdf.cleanup import clean
-from rail_extract.core.frpdf.engine import make_engine
+from rail_extract.core.frpdf.engines import make_engine
 from rail_extract.core.frpdf.models import MODELS
 from rail_extract.core.frpdf.weights import load_arrays
 from rail_extract.core.pipeline import Parameters

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from rail_extract.core.frpdf.cleanup import clean
-from rail_extract.core.frpdf.engine import make_engine
+from rail_extract.core.frpdf.engines import make_engine
 from rail_extract.core.frpdf.models import MODELS
 from rail_extract.core.frpdf.weights import load_arrays
 from rail_extract.core.raster import RailRaster

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from lines import farthest, read_features, read_lines
 from qgis.core import QgsRasterLayer
-from rail_extract.core.frpdf import engine
+from rail_extract.core.frpdf import engines
 from rail_extract.core.raster import cell_size
 from rail_extract.rail_extract_plugin.reading.geotiff import read_header, read_rasters
 
@@ -105,8 +105,8 @@ def test_cleanup_logs_engine_and_cells(run_step, raster, tmp_path, new_feedback)
 
 
 def test_cleanup_without_torch_keeps_grid_and_tags(run_step, raster, tmp_path, monkeypatch):
-    find_spec = engine.find_spec
-    monkeypatch.setattr(engine, "find_spec", lambda name: None if name == "torch" else find_spec(name))
+    find_spec = engines.find_spec
+    monkeypatch.setattr(engines, "find_spec", lambda name: None if name == "torch" else find_spec(name))
     outcome = run_step("frpdfcleanup", {"INPUT": raster, "ITERATIONS": 1, "OUTPUT": tmp_path / "cleaned.tif"})
     assert outcome.ok, outcome.error
     assert outcome.results["ENGINE_USED"].startswith("OpenCV")
