@@ -196,7 +196,7 @@ def project(lines: Sequence[np.ndarray], xy: np.ndarray, reach_m: float, progres
     if not len(lines) or not len(xy):
         nothing = np.empty(0)
         return Feet(nothing.astype(np.int64), nothing.astype(np.int32), nothing, nothing)
-    target = _Stations.along(lines)
+    target = Stations.along(lines)
     starts = range(0, len(xy), POINTS_AT_ONCE)
     found = [target.feet(xy[start : start + POINTS_AT_ONCE], start, reach_m) for start in progress.follow(starts)]
     point, line, t, across = (np.concatenate(column) for column in zip(*found))
@@ -205,7 +205,7 @@ def project(lines: Sequence[np.ndarray], xy: np.ndarray, reach_m: float, progres
 
 
 @dataclass(frozen=True)
-class _Stations:
+class Stations:
     """Stations of several lines, one line after the other; segment k runs from station k to station k + 1."""
 
     tree: cKDTree
@@ -213,7 +213,8 @@ class _Stations:
     t: np.ndarray
 
     @classmethod
-    def along(cls, lines: Sequence[np.ndarray]) -> _Stations:
+    def along(cls, lines: Sequence[np.ndarray]) -> Stations:
+        """Set stations along lines, (n, 2) each."""
         stations, t = zip(*(resample(line, STATION_M) for line in lines))
         number = np.repeat(np.arange(len(lines), dtype=np.int32), [len(one) for one in t])
         return cls(cKDTree(np.concatenate(stations)), number, np.concatenate(t))

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-from qgis.core import NULL, QgsCoordinateReferenceSystem, QgsFeatureRequest, QgsProcessingFeatureSource
+from qgis.core import QgsCoordinateReferenceSystem, QgsFeatureRequest, QgsProcessingFeatureSource
 
 from ...core.alignment.elements import Alignment
 from ...core.alignment.table import alignments, check_table, frame_of, read_table
 from ...core.fields import ELEMENT_FIELDS
 from ...core.frame import LocalFrame
 from ...core.progress import SILENT, Progress
-from .line_layers import GEOMETRY_AS_IT_IS, system_of
+from .line_layers import GEOMETRY_AS_IT_IS, system_of, value_of
 
 
 def read_elements(
@@ -44,10 +42,6 @@ def read_elements(
     check_table(known, name)
     columns = [one.name for one in ELEMENT_FIELDS if one.name in known]
     features = progress.follow(source.getFeatures(QgsFeatureRequest(), GEOMETRY_AS_IT_IS), source.featureCount())
-    rows = read_table([{column: _plain(feature[column]) for column in columns} for feature in features], name)
+    rows = read_table([{column: value_of(feature, column) for column in columns} for feature in features], name)
     frame = frame_of(rows, system_of(crs, progress), name)
     return alignments(rows, frame, progress), frame
-
-
-def _plain(value: Any) -> Any:
-    return None if value == NULL else value

@@ -30,7 +30,7 @@ from ...core.clouds.crs import MAX_COORDINATE, parse_crs, units, warn_of_scale
 from ...core.clouds.mask import Mask
 from ...core.comparison.tracks import SurveyedLine
 from ...core.design_places import check_line, check_places, has_stray
-from ...core.errors import CrsError, MissingError, RailExtractError
+from ...core.errors import CrsError, MissingError, ParameterError, RailExtractError
 from ...core.fields import CENTERLINE_FIELDS, RAIL_FIELDS, Field
 from ...core.frame import ORIGIN_STEP, LocalFrame
 from ...core.polyline import length_along
@@ -42,6 +42,9 @@ CHORD_TOLERANCE_M = 0.0005
 
 MAX_WHOLE, ID = 2**31 - 1, re.compile(r"\s*\d{1,10}\s*")
 """Largest whole number of a field in every format, and an id in a list of them."""
+
+MIXED = "JSON"
+"""Type that QGIS gives to a field whose values are of several types: it takes them for objects, and is left with none."""
 
 GEOMETRY_AS_IT_IS = QgsProcessingFeatureSource.Flag.FlagSkipGeometryValidityChecks
 
@@ -464,7 +467,17 @@ def gaps_of(feature: QgsFeature, xyz: np.ndarray) -> np.ndarray:
 
 
 def value_of(feature: QgsFeature, name: str) -> Any:
-    """Return the value of a field, or None if the field is missing or empty."""
+    """Return the value of a field, or None if the field is missing or empty.
+
+    Raises
+    ------
+    ParameterError
+        QGIS drops the values of the field, as it does where GeoJSON has both whole numbers and texts in one.
+    """
     index = feature.fields().lookupField(name)
+    if index >= 0 and feature.fields().at(index).typeName() == MIXED:
+        raise ParameterError(
+            f"The field {name} has both numbers and texts, and QGIS drops them all: write all of them as texts."
+        )
     value = feature.attribute(index) if index >= 0 else NULL
     return None if value == NULL else value
