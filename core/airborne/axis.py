@@ -101,7 +101,7 @@ class Axis:
 
     def part(self, first_m: float, last_m: float) -> Axis:
         """Return the vertices between two chainages."""
-        inside = (self.t >= first_m) & (self.t <= last_m)
+        inside = slice(*np.searchsorted(self.t, [first_m, np.nextafter(last_m, np.inf)]))
         return Axis(self.xy[inside], self.t[inside])
 
 

@@ -22,7 +22,7 @@ from ..fields import DEVIATIONS
 from ..output.design_files import FORMATS, check_designs, check_format, check_place, write_designs
 from ..output.layers import axes_layer, differences_layer, elements_layer, stations_layer
 from ..parameters import TRANSITIONS, ComparisonParameters, FitParameters
-from ..progress import Estimating
+from ..progress import Estimating, Progress, Recording
 from ..report import build_alignment_page
 from ..report.comparison import build_comparison, describe_shift, verdict_on
 from ..standards import resolve
@@ -85,7 +85,7 @@ def _fit(args: argparse.Namespace) -> None:
     outputs = destinations_of(args, FIT_OUTPUTS)
     settings = FitParameters(args.tolerance / 1000.0, args.min_length, args.transitions, not args.no_round)
     tracks, frame = vectors.read_tracks(args.lines, args.quality, args.rails)
-    progress = Estimating(Console())
+    progress = Recording(Estimating(Console()))
     held = [] if args.fixed is None else vectors.read_elements(args.fixed, "--fixed", progress=progress)
     fits = fit_tracks(tracks, frame, settings, {one.track_id: one for one in held}, progress)
     made = [elements_layer([fit.alignment for fit in fits])]
@@ -95,7 +95,7 @@ def _fit(args: argparse.Namespace) -> None:
     if "report" in outputs:
         courses = [(fit.alignment, fit.deviations) for fit in fits]
         facts = {"Command": args.command_line}
-        outputs["report"].write_text(build_alignment_page(courses, args.lines, facts, True))
+        outputs["report"].write_text(build_alignment_page(courses, args.lines, facts, True, progress.warnings))
     for one in fits:
         count = len(one.alignment.elements)
         print(f"Track {one.alignment.track_id}: {count} elements, root mean square {one.rms_mm:.2f} mm")
@@ -146,7 +146,7 @@ def _import_alignment(args: argparse.Namespace) -> None:
     if args.tracks is None and (args.quality or args.rails or {"deviations", "report"} & set(outputs)):
         raise ParameterError("--deviations and --report compare measured tracks with the alignments: give --tracks.")
     vectors, writing = (vector_module("import-alignment", name) for name in ("vectors", WRITING))
-    progress = Estimating(Console())
+    progress = Recording(Estimating(Console()))
     tracks, own = vectors.read_tracks(args.tracks, args.quality, args.rails, "--tracks") if args.tracks else ([], None)
     alignments = _read_alignments(args, own and own.crs_wkt, progress)
     frame = alignments[0].frame
@@ -162,11 +162,11 @@ def _import_alignment(args: argparse.Namespace) -> None:
     writing.write_all([make() for name, make in makers.items() if name in outputs], outputs, frame)
     if "report" in outputs:
         facts = {"LandXML file": args.file.name, "Command": args.command_line}
-        outputs["report"].write_text(build_alignment_page(courses, args.tracks, facts, False))
+        outputs["report"].write_text(build_alignment_page(courses, args.tracks, facts, False, progress.warnings))
     _print_count(alignments)
 
 
-def _read_alignments(args: argparse.Namespace, tracks: str | None, progress: Estimating) -> list[Alignment]:
+def _read_alignments(args: argparse.Namespace, tracks: str | None, progress: Progress) -> list[Alignment]:
     """Read the alignments of a LandXML file, given the coordinate system of the tracks for a file that states none."""
     system = stated_system(args.file) or args.crs or tracks
     wkt = parse_crs(system).to_wkt() if system else None

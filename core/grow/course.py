@@ -97,9 +97,8 @@ def _grade(z: np.ndarray, along: np.ndarray) -> tuple[float, float]:
 def smoothed(xyz: np.ndarray, along_m: np.ndarray, reach_m: float, seen: np.ndarray) -> np.ndarray:
     """Fit a parabola through the places within `reach_m` of each one that were seen, (n, 3); the others as they are."""
     result = xyz.copy()
-    firsts, lasts = (
-        np.searchsorted(along_m, along_m + off_m, side) for off_m, side in ((-reach_m, "left"), (reach_m, "right"))
-    )
+    firsts = np.searchsorted(along_m, along_m - reach_m)
+    lasts = np.searchsorted(along_m, along_m + reach_m, side="right")
     for number, place_m in enumerate(along_m):
         near = firsts[number] + np.flatnonzero(seen[firsts[number] : lasts[number]])
         if len(near) > 3 and seen[number]:

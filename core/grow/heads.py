@@ -160,7 +160,7 @@ class OnHeads:
             own = np.flatnonzero(self._own.own(xyz[:, :2] - corner))
             on = np.zeros(len(xyz), dtype=bool)
             near = (boxes[:, 0] <= corner + 2 * self._own.side_m) & (boxes[:, 1] >= corner - self._own.side_m)
-            for rail in (rails[at] for at in np.flatnonzero(near.all(axis=1))):
+            for rail in (rails[at] for at in np.flatnonzero(near.all(axis=1)).tolist()):
                 on[own[self._level_with(rail, xyz[own], self._squares[key])]] = True
                 if rail.beam is not THIN:  # whose points beside the head are labelled as well
                     on[self._squares[key].number[self._along(rail, self._squares[key].xyz).point]] = True

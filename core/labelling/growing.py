@@ -125,7 +125,7 @@ def grow_all(
     reading, growing = progress.divide((1.0, 1.0))
     local = [request.zero.to_local(np.column_stack([seed[:, :2], np.zeros(len(seed))]))[:, :2] for seed in seeds]
     places = [resample(seed, LINE_STEP_M)[0] if len(seed) > 1 else seed for seed in local]
-    _check_seeds(request, np.concatenate(places))
+    places = _in_cloud(request, places)
     request.announce(progress)
     cloud = Cloud(request, np.concatenate(places), settings, folder, reading)
     progress.status("Following the rails")
@@ -175,16 +175,27 @@ class Cloud:
         return read_square(files_of(key, self._sorted))
 
 
-def _check_seeds(request: Request, places: np.ndarray) -> None:
-    """Refuse seeds of which none is in the cloud.
+def _in_cloud(request: Request, seeds: Sequence[np.ndarray]) -> list[np.ndarray]:
+    """Return the places of each seed, (k, 2), that may be in the cloud.
 
     Raises
     ------
     OffCloudError
+        None is.
     """
-    near = Guide(places, np.zeros_like(places), NEAR_M)
-    if not any(near.reaches(*box_of(request, [header.extent])) for header in request.headers):
+    boxes = [box_of(request, [header.extent]) for header in request.headers]
+    found = [seed[_inside(seed, boxes)] for seed in seeds]
+    if not any(map(len, found)):
         raise OffCloudError("No seed is in the cloud: check the place and the coordinate system of the seeds.")
+    return found
+
+
+def _inside(xy: np.ndarray, boxes: Sequence[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
+    """Return which places, (k, 2), are in a box or near it, (k,) bool; a box of NaN may be anywhere."""
+    inside = np.zeros(len(xy), dtype=bool)
+    for low, high in boxes:
+        inside |= ~((xy < low - NEAR_M) | (xy > high + NEAR_M)).any(axis=1)
+    return inside
 
 
 def _figures(xyz: np.ndarray, settings: GrowSettings) -> SearchFigures:

@@ -8,7 +8,7 @@ from typing import Any
 from qgis.core import QgsProcessingFeatureSource
 
 from ...core.parameters import FitParameters
-from ...core.progress import Progress
+from ...core.progress import Progress, Recording
 from ..dialog import inputs, outputs
 from ..dialog import parameters as groups
 from ..dialog.definitions import Definitions
@@ -95,6 +95,7 @@ class FitAlignment(RailAlgorithm):
         from ...core.output.layers import elements_layer, stations_layer
         from ..reading.tracks_to_fit import read_fixed, read_tracks
 
+        progress = Recording(progress)
         tracks, frame = read_tracks(job.tracks, job.quality, job.rails, progress.span(0, READING))
         fixed = read_fixed(job.fixed, frame) if job.fixed else {}
         fits = fit_tracks(tracks, frame, job.settings, fixed, progress.span(READING, FITTING))
@@ -107,6 +108,6 @@ class FitAlignment(RailAlgorithm):
         }
         writers = {
             **layer_writers(values, makers, frame),
-            "REPORT": lambda: write_alignment_report(values, courses, name, facts, True),
+            "REPORT": lambda: write_alignment_report(values, courses, name, facts, True, progress.warnings),
         }
         return {**write_each(writers, values), **figures_of_fits(fits)}

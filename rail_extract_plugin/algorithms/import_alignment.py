@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from qgis.core import QgsProcessingFeatureSource
 
 from ...core.errors import CrsError, ParameterError
-from ...core.progress import Progress
+from ...core.progress import Progress, Recording
 from ..dialog import inputs, outputs
 from ..dialog.definitions import Definitions
 from ..dialog.parameter_values import ParameterValues
@@ -109,6 +109,7 @@ class ImportAlignment(RailAlgorithm):
         from ...core.output.design_files import check_place
         from ...core.output.layers import axes_layer, elements_layer, stations_layer
 
+        progress = Recording(progress)
         read = read_landxml(job.path, job.east_first, progress.span(0, READING))
         frame = replace(read[0].frame, crs_wkt=job.crs_wkt)
         alignments = tuple(replace(one, frame=frame) for one in read)
@@ -123,7 +124,7 @@ class ImportAlignment(RailAlgorithm):
         }
         writers = {
             **layer_writers(values, makers, frame),
-            "REPORT": lambda: write_alignment_report(values, courses, _name(job), facts, False),
+            "REPORT": lambda: write_alignment_report(values, courses, _name(job), facts, False, progress.warnings),
         }
         count = sum(len(alignment.elements) for alignment in alignments)
         written = write_each(writers, values)

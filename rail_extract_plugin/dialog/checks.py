@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -16,6 +17,7 @@ from qgis.core import (
     QgsProcessingParameterRasterLayer,
 )
 
+from ...core.design_numbers import number_in
 from .definitions import UNBOUNDED
 from .parameter_values import ParameterValues
 
@@ -65,16 +67,22 @@ def explain_invalid(
     context : QgsProcessingContext
     """
     given = definition.defaultValue() if value is None else value
-    if definition.checkValueIsAcceptable(given, context):
+    if definition.checkValueIsAcceptable(given, context) and not _is_no_number(definition, given):
         return None
     shown = "empty" if given in (None, "") else given
     return f"{definition.name()} can't be {shown}: give {_expected(definition)}."
 
 
+def _is_no_number(definition: QgsProcessingParameterDefinition, given: Any) -> bool:
+    """Return whether a text is given for a number: QGIS leaves out that of an optional one without a word."""
+    number = number_in(given) if isinstance(given, str) else None
+    return isinstance(definition, QgsProcessingParameterNumber) and number is not None and math.isnan(number)
+
+
 def _expected(definition: QgsProcessingParameterDefinition) -> str:
     if isinstance(definition, QgsProcessingParameterNumber):
         lowest, highest = definition.minimum(), definition.maximum()
-        return f"{lowest:g} or more" if highest == UNBOUNDED else f"a number from {lowest:g} to {highest:g}"
+        return f"{lowest:g} or more" if highest == UNBOUNDED else f"a number from {lowest:,.10g} to {highest:,.10g}"
     if isinstance(definition, QgsProcessingParameterEnum):
         return f"one of its {len(definition.options())} choices, such as {definition.options()[0]}"
     known = next((text for kind, text in EXPECTED.items() if isinstance(definition, kind)), None)

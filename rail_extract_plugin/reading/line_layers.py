@@ -44,7 +44,7 @@ MAX_WHOLE, ID = 2**31 - 1, re.compile(r"\s*\d{1,10}\s*")
 """Largest whole number of a field in every format, and an id in a list of them."""
 
 MIXED = "JSON"
-"""Type that QGIS gives to a field whose values are of several types: it takes them for objects, and is left with none."""
+"""Type that QGIS gives to a field with values of several types: it takes them for objects, and is left with none."""
 
 GEOMETRY_AS_IT_IS = QgsProcessingFeatureSource.Flag.FlagSkipGeometryValidityChecks
 

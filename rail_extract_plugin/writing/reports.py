@@ -56,6 +56,7 @@ def write_alignment_report(
     source: str,
     facts: Mapping[str, str],
     fitted: bool,
+    warnings: Sequence[str],
 ) -> dict[str, str]:
     """Write the report on alignments; see `write_shown`.
 
@@ -69,11 +70,13 @@ def write_alignment_report(
         Facts to state by name, besides date, version and coordinate system.
     fitted : bool
         Whether the alignments were fitted to the tracks.
+    warnings : sequence of str
+        What the user was warned of.
     """
     from ...core.report import build_alignment_page
 
     def build() -> str:
-        return build_alignment_page(courses, source, facts, fitted)
+        return build_alignment_page(courses, source, facts, fitted, warnings)
 
     return write_shown(values, build)
 

@@ -120,7 +120,7 @@ def write_xml(folder: Path) -> list[Path]:
 
 
 def change_values(path: Path, rng: random.Random) -> None:
-    """Write a layer anew with one to three other coordinates or attributes."""
+    """Write a layer again with one to three other coordinates or attributes."""
     found = _good(path.stem)
     for _ in range(rng.choice((1, 1, 2, 3))):
         at = rng.randrange(len(found))

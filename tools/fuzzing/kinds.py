@@ -40,7 +40,7 @@ class Kind:
     needs : str
         Module that must be installed.
     remake : callable, optional
-        Writes a file anew with other values, which is done in half of the cases instead of damaging its bytes.
+        Writes a file again with other values, which is done in half of the cases instead of damaging its bytes.
     """
 
     name: str
