@@ -1,5 +1,6 @@
 """Faults of axes, posts and jumps, in Station Along Axis."""
 
+import json
 import math
 
 import pytest
@@ -12,6 +13,16 @@ AXIS_M = "LINESTRING M(500000 3000000 12, 501000 3000000 13)"
 OTHER = "LINESTRING(500000 3000400, 501000 3000400)"
 LINE = "LINESTRING Z (500000 3000000 100, 500040 3000000 100)"
 PLACE = "POINT(500100 3000004)"
+
+
+def with_objects(bench):
+    """A GeoJSON file of a place with an object as one of its values, as exports of OpenStreetMap have."""
+    place = {"type": "Point", "coordinates": [500100, 3000004]}
+    feature = {"type": "Feature", "properties": {"tags": {"railway": "signal"}}, "geometry": place}
+    crs = {"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::32643"}}
+    path = bench.folder / "places.geojson"
+    path.write_text(json.dumps({"type": "FeatureCollection", "crs": crs, "features": [feature]}), encoding="utf-8")
+    return path
 
 
 def infinite_measure():
@@ -81,6 +92,7 @@ FAULTS = {
             **given(START_KM=1.0)(bench),
             "INPUT": layer_of(PLACE, "POINT(1e308 1e308)", kind="Point"),
         },
+        "places with objects in a field": lambda bench: {**given(START_KM=1.0)(bench), "INPUT": with_objects(bench)},
         "post with a kilometre of 1e308": given(POSTS=posts((0, 3, 1.0), (200, 3, 1e308))),
         "post without a kilometre": given(POSTS=posts((0, 3, 1.0), (200, 3, None))),
         "post outside of any map": given(POSTS=posts((0, 3, 1.0), (100, 3, 1.1), (1e200, 3, 1.2))),
