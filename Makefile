@@ -53,6 +53,11 @@ golden-all: .venv/installed  ## compare every scene with its figures, with the b
 ablation: .venv/installed  ## switch rules off one at a time, and print which golden figures need each; RULES=tracks. chooses
 	@PYTHONPATH=$(AS_PACKAGE) $(PYTHON) benchmarks/ablation.py $(RULES)
 
+.PHONY: worlds
+worlds: .venv/installed  ## extract COUNT=100 worlds drawn at random, from seed FROM=1, raw and classified; SEED=7 draws one
+	@PYTHONPATH=$(AS_PACKAGE) $(PYTHON) benchmarks/worlds.py --from $(or $(FROM),1) --count $(or $(COUNT),100) \
+		$(if $(JOBS),--jobs $(JOBS)) $(if $(KIND),--kind $(KIND)) $(if $(SEED),--seed $(SEED))
+
 .PHONY: fuzz
 fuzz: plugin  ## read damaged files of every kind for MINUTES=5, from SEED=0; `tools/fuzz.py KIND:SEED` repeats one
 	@. ./$(ENVIRONMENT) && $(PYTHON) tools/fuzz.py --minutes $(or $(MINUTES),5) --seed $(or $(SEED),0)

@@ -17,7 +17,7 @@ from rail_extract.core.grow.heads import Rail
 from rail_extract.core.grow.settings import GrowSettings
 from rail_extract.core.polyline import interpolate, length_along, project
 from rail_extract.laboratory.ruler.classification import truth
-from rail_extract.laboratory.ruler.lines import cut, nearest
+from rail_extract.laboratory.ruler.lines import cut
 from rail_extract.laboratory.ruler.whole_clouds import GrowingCloud
 from rail_extract.laboratory.scenes.raw import RawScene
 from rail_extract.laboratory.scenes.raw_catalogue import AIR, RAW_SCENES
@@ -94,7 +94,7 @@ def measured(scene: RawScene, wide: bool) -> Row:
         row.labelled += int(on.sum())
         row.right += int((on & (head | beside)).sum())
         for number, grown in enumerate(growth.rails):
-            step = grown.xyz - nearest(grown.xyz, cut(scene.shown))[0]
+            step = grown.xyz - cut(scene.shown).nearest(grown.xyz)[0]
             across = np.hypot(step[:, 0], step[:, 1])
             near = across <= RIGHT_M
             share_m = np.gradient(length_along(grown.xyz[:, :2]))
@@ -136,7 +136,7 @@ def _beside(rails: tuple[Rail, ...], scene: RawScene) -> np.ndarray:
     reach_m = scene.standard.head_width_m / 2 + RIGHT_M
     chosen = np.flatnonzero(scene.head)
     chosen = chosen[project([rail.xyz[:, :2] for rail in rails], scene.xyz[chosen, :2], reach_m).point]
-    feet, _ = nearest(scene.xyz[chosen], cut(scene.rails))
+    feet, _ = cut(scene.rails).nearest(scene.xyz[chosen])
     near[chosen[scene.xyz[chosen, 2] - feet[:, 2] > -0.035]] = True
     return near
 

@@ -29,7 +29,7 @@ from rail_extract.core.pipeline import extract_rails
 from rail_extract.core.rails import RailLine
 from rail_extract.core.standards import RAIL_CLASS, RailStandard, closest_standard, resolve
 from rail_extract.laboratory.ruler.agreement import HEADER, agreement
-from rail_extract.laboratory.ruler.lines import cut, nearest
+from rail_extract.laboratory.ruler.lines import cut
 from rail_extract.laboratory.ruler.whole_clouds import classify_cloud
 from scipy.spatial import cKDTree
 
@@ -350,19 +350,19 @@ def compare(rails: Sequence[RailLine], heads: np.ndarray) -> tuple[int, int, flo
     """
     cells = np.floor(heads[:, :2] / CELL_M).astype(np.int64)
     count = len(np.unique(cells, axis=0))
-    pieces = cut([one.xyz for one in rails])
-    if not len(pieces.start) or not len(heads):
+    chords = cut([one.xyz for one in rails])
+    if not len(chords.start) or not len(heads):
         return count, 0, 0.0, np.empty(0), np.empty(0)
-    feet, number = nearest(heads, pieces)
+    feet, number = chords.nearest(heads)
     off = heads - feet
     near = np.hypot(off[:, 0], off[:, 1]) <= NEAR_M
-    distance, _ = cKDTree(heads[:, :2]).query(pieces.middle[:, :2])
-    across = -np.sum(off[:, :2] * pieces.left[number], axis=1)
-    metre = np.column_stack([pieces.number, np.floor(pieces.t)])[number]
+    distance, _ = cKDTree(heads[:, :2]).query(chords.middle[:, :2])
+    across = -np.sum(off[:, :2] * chords.left[number], axis=1)
+    metre = np.column_stack([chords.number, np.floor(chords.middle_t)])[number]
     return (
         count,
         len(np.unique(cells[near], axis=0)),
-        float(pieces.lengths[distance <= NEAR_M].sum()),
+        float(chords.lengths[distance <= NEAR_M].sum()),
         medians(metre, across, (np.abs(across) <= ON_HEAD_M) & (off[:, 2] >= -BELOW_M)),
         medians(metre, -off[:, 2], np.abs(across) <= ON_TOP_M),
     )

@@ -6,7 +6,7 @@ import numpy as np
 
 from .design_numbers import LENGTH, MAX_PLACE_M, NUMBER, checked
 from .errors import DesignNumberError
-from .polyline import length_along
+from .polyline import Polyline
 
 MAX_SEGMENT_M = 100_000.0
 """A longer straight segment of a measured line or a guide has a stray vertex: in the plane of a map, a railway that is
@@ -43,7 +43,7 @@ def check_line(xy: np.ndarray, where: str, unit_m: float = 1.0) -> np.ndarray:
     DesignNumberError
     """
     check_places(xy, where, unit_m)
-    checked(float(length_along(xy)[-1]) * unit_m, LENGTH, where, "length")
+    checked(Polyline(xy).length_m * unit_m, LENGTH, where, "length")
     if has_stray(xy * unit_m):
         raise DesignNumberError(f"{where} has a stray vertex: repair or delete it.")
     return xy

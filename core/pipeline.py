@@ -6,7 +6,7 @@ another in this process or on many machines (see `tasks`). The lines do not depe
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -200,7 +200,7 @@ def _walk(
     drawing, pairing, measuring = progress.divide((DRAWING, PAIRING, MEASURING))
     progress.status("Drawing the rails")
     sources = plausible(sources, progress)
-    rails, strips, cleaned = _draw_rails(sources, parameters, runner, drawing, raw)
+    rails, strips, cleaned, sources = _draw_rails(sources, parameters, runner, drawing, raw)
     centerlines = _pair_rails(rails, sources, parameters, runner, pairing, is_warned)
     progress.info(f"Paired: {_lengths(centerlines, 'track')}.")
     rails = with_tracks(rails, centerlines, progress)
@@ -231,7 +231,7 @@ def _walk(
 
 def _draw_rails(
     sources: Sequence[PointSource], parameters: Parameters, runner: Runner, progress: Progress, raw: bool
-) -> tuple[list[RailLine], np.ndarray, dict[int, RailRaster]]:
+) -> tuple[list[RailLine], np.ndarray, dict[int, RailRaster], list[PointSource]]:
     """Draw the rails of all classes.
 
     Returns
@@ -241,15 +241,20 @@ def _draw_rails(
         Offsets of the strips in the frame of the cloud, see `squares.pieces.rows_in_frame`.
     cleaned : dict of int to RailRaster
         Cleaned rasters by class, if they are to be kept.
+    sources : list of PointSource
+        Those of points that know whether their cloud blunts heads.
     """
     rails: list[RailLine] = []
     strips: list[np.ndarray] = []
     cleaned: dict[int, RailRaster] = {}
+    judged: list[PointSource] = []
     any_square = False
     for source, share in zip(sources, progress.split(len(sources))):
         squares = {square.key: square for square in occupied_squares(sources, source)}
         _announce_squares(source, squares, parameters, share)
         parts, rasters = _draw_squares(source, squares, parameters, runner, share)
+        parts, source = _drawn_alike(parts, source, squares, parameters, runner, share)
+        judged.append(source)
         any_square |= bool(parts) or not squares
         strips += [rows_in_frame(part, source.frame) for part in parts]
         found = whole_rails(_released(parts), source.frame, parameters, len(rails) + 1, share) if parts else []
@@ -263,7 +268,7 @@ def _draw_rails(
             cleaned[source.class_code] = assembled(rasters, squares, source.frame)
     if not any_square:
         raise RailExtractError(f"Not one square could be extracted; the last error was: {runner.failures[-1]}")
-    return rails, np.concatenate(strips or [rows_of((), ())]), cleaned
+    return rails, np.concatenate(strips or [rows_of((), ())]), cleaned, judged
 
 
 def _pair_rails(
@@ -306,9 +311,16 @@ def _lengths(lines: Sequence[RailLine] | Sequence[Centerline], what: str) -> str
 
 
 def _draw_squares(
-    source: PointSource, squares: Mapping[Key, Square], parameters: Parameters, runner: Runner, progress: Progress
+    source: PointSource,
+    squares: Mapping[Key, Square],
+    parameters: Parameters,
+    runner: Runner,
+    progress: Progress,
+    drawn: Collection[Key] | None = None,
 ) -> tuple[list[SquareRails], dict[Key, RailRaster]]:
     """Clean the raster of every square of a class, and draw the lines of each square once its neighbours are clean.
+
+    Given `drawn`, only the lines of these squares are drawn.
 
     Returns
     -------
@@ -318,7 +330,7 @@ def _draw_squares(
     """
     parts: list[SquareRails] = []
     rasters: dict[Key, RailRaster] = {}
-    for (step, key), result in runner.run(dict(_square_tasks(source, squares, parameters)), progress):
+    for (step, key), result in runner.run(dict(_square_tasks(source, squares, parameters, drawn or squares)), progress):
         if step is _draw:
             parts.append(result)
         else:
@@ -326,10 +338,35 @@ def _draw_squares(
     return parts, rasters
 
 
+def _drawn_alike(
+    parts: list[SquareRails],
+    source: PointSource,
+    squares: Mapping[Key, Square],
+    parameters: Parameters,
+    runner: Runner,
+    progress: Progress,
+) -> tuple[list[SquareRails], PointSource]:
+    """Draw the squares again that took the cloud for blunt while the most length shows that it is sharp, or vice versa.
+
+    Also returns the source of points that know it.
+    """
+    shown_m = np.zeros(2)
+    for part in parts:
+        shown_m[int(bool(part.blunt))] += sum(rail.length_m for rail in part.rails)
+    source = source.judged(bool(shown_m[1] > shown_m[0]))
+    odd = {part.square.key for part in parts if part.blunt not in (None, shown_m[1] > shown_m[0])}
+    if odd:
+        near = {key: square for key, square in squares.items() if odd.intersection(around(key))}
+        settings = replace(parameters, keep_cleaned=False)
+        again, _ = _draw_squares(source, near, settings, runner, progress.span(1.0, 1.0), odd)
+        parts = [part for part in parts if part.square.key not in odd] + again
+    return parts, source
+
+
 def _square_tasks(
-    source: PointSource, squares: Mapping[Key, Square], parameters: Parameters
+    source: PointSource, squares: Mapping[Key, Square], parameters: Parameters, drawn: Collection[Key]
 ) -> Iterator[tuple[tuple[Callable, Key], Task]]:
-    """Yield the tasks of all squares of a class: first those that clean, then those that draw."""
+    """Yield the tasks of squares of a class: first those that clean all, then those that draw the lines of some."""
     # These two do not change the lines: without them, a runner that keeps results finds those of earlier runs.
     settings = replace(parameters, quality_step_m=None, keep_cleaned=False)
     arguments = {key: (source.part(square), square, settings) for key, square in squares.items()}
@@ -346,7 +383,7 @@ def _square_tasks(
                 returned=parameters.keep_cleaned,
             ),
         )
-    for key in squares:
+    for key in drawn:
         neighbours = tuple((_clean, near) for near in around(key) if near in squares and near != key)
         yield (
             (_draw, key),

@@ -1,10 +1,11 @@
-"""Geometry along polylines in plan: stations, normals, projection of points, and direction."""
+"""Lines in plan: chainage, normals, parts and feet of one line, and the feet of points on the nearest of many."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -13,7 +14,7 @@ from .kernels import threads
 from .progress import SILENT, Progress
 
 STATION_M = 0.05
-"""Spacing of the stations among which points find their nearest line; of two lines this close, either is taken."""
+"""Length of the chords among which points find their nearest line; of two lines this close, either is taken."""
 
 POINTS_AT_ONCE = 500_000
 """Points projected at once: limits the memory, and allows several checks for cancellation per second."""
@@ -21,11 +22,22 @@ POINTS_AT_ONCE = 500_000
 POINTS_FOR_THREADS = 10_000
 """Fewer points are projected by a single thread: on two cores, starting the threads takes 0.3 ms, the points 2 ms."""
 
+CANDIDATES = 4
+"""Number of nearest chords of which one has the nearest point: near a place there may be two of a line and a second
+line."""
+
 CLOSED_M = 0.01
 """Largest distance between the ends of a closed line; the ends of extracted rings coincide, even after thinning."""
 
 MIN_RING_M = 10.0
 """Shortest closed rail: no track turns round in less."""
+
+FOOT_ROUNDS = 3
+"""Rounds of the search for the segment with the foot of a point, from a place near it: the first one is off by the bend
+of the line."""
+
+PAST_END = 1.0
+"""A foot this many segments from the middle of its segment is beside the line; a bend leaves small gaps."""
 
 SAME_PLACE_M = 1e-9
 """Vertices closer than this along a line are the same."""
@@ -35,19 +47,8 @@ NORTH_TANGENT = np.tan(np.radians(1.0))
 
 
 def length_along(vertices: np.ndarray) -> np.ndarray:
-    """Return the distance of each vertex from the first, along the line.
+    """Return the distance of each vertex from the first along a line: in plan for (n, 2), in space for (n, 3).
 
-    Parameters
-    ----------
-    vertices : (n, 2) or (n, 3) array
-        A polyline; plan length for two columns, true length for three.
-
-    Returns
-    -------
-    (n,) float array, starting at 0
-
-    Examples
-    --------
     >>> length_along(np.array([[0.0, 0.0], [3.0, 4.0], [3.0, 10.0]])).tolist()
     [0.0, 5.0, 11.0]
     """
@@ -55,72 +56,153 @@ def length_along(vertices: np.ndarray) -> np.ndarray:
     return np.concatenate([[0.0], np.cumsum(steps)])
 
 
-def resample(vertices: np.ndarray, step_m: float) -> tuple[np.ndarray, np.ndarray]:
-    """Place stations along a polyline, from end to end, at equal distances of at most `step_m`.
+@dataclass(frozen=True, eq=False)
+class Polyline:
+    """A line with chainages; all that is computed along it is in plan.
 
-    Parameters
+    Attributes
     ----------
-    vertices : (n, d) array
-        A polyline of nonzero length; distances are measured in the first two columns.
-    step_m : float
-
-    Returns
-    -------
-    stations : (m, d) array
-    t : (m,) array
-        Plan distance from the start.
+    xyz : (n, 2) or (n, 3) array
+        Vertices, metres.
+    given : (n,) array or None
+        Chainages of the vertices, rising, where they are those of another line; None for the distance from the first.
 
     Examples
     --------
-    >>> stations, t = resample(np.array([[0.0, 0.0], [10.0, 0.0]]), 4.0)
-    >>> t.round(2).tolist()
-    [0.0, 3.33, 6.67, 10.0]
+    >>> line = Polyline(np.array([[0.0, 0.0], [4.0, 0.0], [9.0, 0.0]]))
+    >>> line.length_m, line.at(np.array([5.0])).tolist(), line.part(3.0, 5.0).xyz[:, 0].tolist()
+    (9.0, [[5.0, 0.0]], [3.0, 4.0, 5.0])
     """
-    along = length_along(vertices[:, :2])
-    t = np.linspace(0.0, along[-1], max(int(np.ceil(along[-1] / step_m)), 1) + 1)
-    return interpolate(vertices, along, t), t
+
+    xyz: np.ndarray
+    given: np.ndarray | None = None
+
+    @property
+    def xy(self) -> np.ndarray:
+        """Vertices in plan, (n, 2)."""
+        return self.xyz[:, :2]
+
+    @cached_property
+    def t(self) -> np.ndarray:
+        """Chainage of each vertex, (n,) metres."""
+        return length_along(self.xy) if self.given is None else self.given
+
+    @property
+    def length_m(self) -> float:
+        """Difference of the chainages of both ends."""
+        return float(self.t[-1] - self.t[0])
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether the line ends where it starts."""
+        dx, dy = self.xyz[-1, :2] - self.xyz[0, :2]
+        return math.hypot(dx, dy) <= CLOSED_M and self.length_m > MIN_RING_M
+
+    @property
+    def starts_at_its_end(self) -> bool:
+        """Whether the line must be reversed to start in the west, or in the south if it runs north."""
+        dx, dy = self.xyz[-1, :2] - self.xyz[0, :2]
+        if abs(dx) <= NORTH_TANGENT * abs(dy):
+            return bool(dy < 0)
+        return bool(dx < 0)
+
+    @cached_property
+    def tangents(self) -> np.ndarray:
+        """Unit vectors along the line at its vertices, (n, 2)."""
+        ahead = np.diff(self.xy, axis=0)
+        both = np.concatenate([ahead[:1], ahead[:-1] + ahead[1:], ahead[-1:]])
+        return both / np.maximum(np.linalg.norm(both, axis=1, keepdims=True), np.finfo(float).tiny)
+
+    @cached_property
+    def normals(self) -> np.ndarray:
+        """Unit vectors to the left at the vertices, (n, 2): at a vertex, of the bisector of its two segments."""
+        return np.column_stack([-self.tangents[:, 1], self.tangents[:, 0]])
+
+    def at(self, t: np.ndarray) -> np.ndarray:
+        """Return the places at chainages, (m, d); beyond the ends, those of the ends."""
+        return interpolate(self.xyz, self.t, t)
+
+    def left_at(self, t: np.ndarray) -> np.ndarray:
+        """Return unit vectors to the left at chainages, (m, 2)."""
+        left = interpolate(self.normals, self.t, t)
+        return left / np.hypot(*left.T)[:, None]
+
+    def part(self, start: float, end: float) -> Polyline:
+        """Return the part between two chainages, with vertices at both; its chainages start at 0."""
+        inner = self.t[(self.t > start + SAME_PLACE_M) & (self.t < end - SAME_PLACE_M)]
+        return Polyline(self.at(np.concatenate([[start], inner, [end]])))
+
+    def resampled(self, step_m: float, start: float = -np.inf, end: float = np.inf) -> Polyline:
+        """Return the line from one chainage to another with vertices at equal distances of at most `step_m`.
+
+        >>> Polyline(np.array([[0.0, 0.0], [10.0, 0.0]])).resampled(4.0).t.round(2).tolist()
+        [0.0, 3.33, 6.67, 10.0]
+        """
+        start, end = max(start, self.t[0]), min(end, self.t[-1])
+        t = np.linspace(start, end, max(int(np.ceil((end - start) / step_m)), 1) + 1)
+        return Polyline(self.at(t), t)
+
+    def feet(self, xy: np.ndarray, reach_m: float) -> Feet:
+        """Project points, (k, 2), onto the line; points beyond `reach_m` or past its ends are left out."""
+        feet = self._chords.feet(xy, reach_m)
+        return feet if self.given is None else replace(feet, t=np.interp(feet.t, length_along(self.xy), self.given))
+
+    def feet_near(self, xy: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return chainages of the feet of points, (k, 2), and distances to the left; NaN past both ends.
+
+        The chainages `t`, (k,), of places beside the feet lead to them, much faster than a search.
+        """
+        along = np.diff(self.xy, axis=0)
+        length = np.hypot(*along.T)
+        segment = np.searchsorted(self.t, t) - 1
+        for _ in range(FOOT_ROUNDS + 1):
+            segment = np.clip(segment, 0, len(length) - 1)
+            step = xy - self.xy[segment]
+            share = np.einsum("ij,ij->i", step, along[segment]) / length[segment] ** 2
+            last, segment = segment, segment + np.floor(share).astype(np.int64)
+        across = cross(along[last], step) / length[last]
+        beside = np.abs(share - 0.5) < PAST_END
+        return np.where(beside, self.t[last] + share * np.diff(self.t)[last], np.nan), np.where(beside, across, np.nan)
+
+    @cached_property
+    def _chords(self) -> Chords:
+        return Chords.of([Polyline(self.xy)], STATION_M)
+
+
+def resample(vertices: np.ndarray, step_m: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return stations along a polyline and their chainages; see `Polyline.resampled`."""
+    line = Polyline(vertices).resampled(step_m)
+    return line.xyz, line.t
 
 
 def is_closed(line: np.ndarray) -> bool:
-    """Return whether a line, (n, 2) or (n, 3), ends in plan where it starts."""
-    dx, dy = line[-1, :2] - line[0, :2]
-    return math.hypot(dx, dy) <= CLOSED_M and bool(length_along(line[:, :2])[-1] > MIN_RING_M)
-
-
-def interpolate(values: np.ndarray, along: np.ndarray, t: np.ndarray) -> np.ndarray:
-    """Interpolate linearly between rows of an array.
-
-    Parameters
-    ----------
-    values : (n, d) array
-    along : (n,) array
-        Chainage of each row, increasing.
-    t : (m,) array
-        Chainages to interpolate at.
-
-    Returns
-    -------
-    (m, d) array
-    """
-    return np.column_stack([np.interp(t, along, column) for column in values.T])
+    """Return `Polyline.is_closed`."""
+    return Polyline(line).is_closed
 
 
 def part(vertices: np.ndarray, start: float, end: float) -> np.ndarray:
-    """Return the part of a polyline, (n, d), between two plan chainages, with vertices at both, (m, d).
-
-    >>> part(np.array([[0.0, 0.0], [4.0, 0.0], [9.0, 0.0]]), 3.0, 5.0)[:, 0].tolist()
-    [3.0, 4.0, 5.0]
-    """
-    along = length_along(vertices[:, :2])
-    inner = along[(along > start + SAME_PLACE_M) & (along < end - SAME_PLACE_M)]
-    return interpolate(vertices, along, np.concatenate([[start], inner, [end]]))
+    """Return the vertices of `Polyline.part`."""
+    return Polyline(vertices).part(start, end).xyz
 
 
 def unit_tangents(vertices: np.ndarray) -> np.ndarray:
-    """Return the plan directions of a polyline, (n, d), at its vertices as (n, 2) unit vectors."""
-    ahead = np.diff(vertices[:, :2], axis=0)
-    both = np.concatenate([ahead[:1], ahead[:-1] + ahead[1:], ahead[-1:]])
-    return both / np.maximum(np.linalg.norm(both, axis=1, keepdims=True), np.finfo(float).tiny)
+    """Return `Polyline.tangents`."""
+    return Polyline(vertices).tangents
+
+
+def left_normals(vertices: np.ndarray) -> np.ndarray:
+    """Return `Polyline.normals`."""
+    return Polyline(vertices).normals
+
+
+def starts_at_its_end(vertices: np.ndarray) -> bool:
+    """Return `Polyline.starts_at_its_end`."""
+    return Polyline(vertices).starts_at_its_end
+
+
+def interpolate(values: np.ndarray, along: np.ndarray, t: np.ndarray) -> np.ndarray:
+    """Interpolate linearly between the rows of an array, (n, d), at increasing chainages, (n,); returns (m, d)."""
+    return np.column_stack([np.interp(t, along, column) for column in values.T])
 
 
 def distance_to(t: np.ndarray, stations: np.ndarray) -> np.ndarray:
@@ -128,24 +210,6 @@ def distance_to(t: np.ndarray, stations: np.ndarray) -> np.ndarray:
     around = np.concatenate([[-np.inf], t, [np.inf]])
     after = np.searchsorted(t, stations) + 1
     return np.minimum(stations - around[after - 1], around[after] - stations)
-
-
-def left_normals(vertices: np.ndarray) -> np.ndarray:
-    """Return the normals to the left of a polyline at its vertices as (n, 2) unit vectors."""
-    tangents = unit_tangents(vertices)
-    return np.column_stack([-tangents[:, 1], tangents[:, 0]])
-
-
-def starts_at_its_end(vertices: np.ndarray) -> bool:
-    """Return whether a line must be reversed to start in the west, or in the south if it runs north.
-
-    >>> starts_at_its_end(np.array([[5.0, 0.0], [0.0, 0.0]]))
-    True
-    """
-    dx, dy = vertices[-1, :2] - vertices[0, :2]
-    if abs(dx) <= NORTH_TANGENT * abs(dy):
-        return bool(dy < 0)
-    return bool(dx < 0)
 
 
 @dataclass(frozen=True)
@@ -177,52 +241,127 @@ class Feet:
 
 
 def project(lines: Sequence[np.ndarray], xy: np.ndarray, reach_m: float, progress: Progress = SILENT) -> Feet:
-    """Project points onto the nearest line; points beyond `reach_m` or past a line's end are left out.
+    """Project points, (k, 2), onto the nearest line; points beyond `reach_m` or past a line's end are left out.
 
-    Parameters
-    ----------
-    lines : sequence of (n, 2) arrays
-    xy : (k, 2) array
-    reach_m : float
-        Largest distance between a point and its foot, metres.
-    progress : Progress
-
-    Examples
-    --------
     >>> feet = project([np.array([[0.0, 0.0], [10.0, 0.0]])], np.array([[4.0, 0.05], [7.0, 3.0]]), reach_m=0.1)
     >>> feet.point.tolist(), feet.t.round(3).tolist(), feet.across.round(3).tolist()
     ([0], [4.0], [0.05])
     """
-    if not len(lines) or not len(xy):
-        nothing = np.empty(0)
-        return Feet(nothing.astype(np.int64), nothing.astype(np.int32), nothing, nothing)
-    target = Stations.along(lines)
-    starts = range(0, len(xy), POINTS_AT_ONCE)
-    found = [target.feet(xy[start : start + POINTS_AT_ONCE], start, reach_m) for start in progress.follow(starts)]
-    point, line, t, across = (np.concatenate(column) for column in zip(*found))
-    order = np.lexsort((t, line))
-    return Feet(point[order], line[order], t[order], across[order])
+    return Chords.of([Polyline(line[:, :2]) for line in lines], STATION_M).feet(xy, reach_m, progress)
 
 
-@dataclass(frozen=True)
-class Stations:
-    """Stations of several lines, one line after the other; segment k runs from station k to station k + 1."""
+@dataclass(frozen=True, eq=False)
+class Chords:
+    """Lines cut into short chords, in search trees.
 
-    tree: cKDTree
+    Attributes
+    ----------
+    xyz : (n, d) array
+        Places on the lines, one line after the other, from each of which a chord leads to the next.
+    line : (n,) int array
+        Number of the line of each place.
+    t : (n,) array
+        Chainage of each place.
+    """
+
+    xyz: np.ndarray
     line: np.ndarray
     t: np.ndarray
 
     @classmethod
-    def along(cls, lines: Sequence[np.ndarray]) -> Stations:
-        """Set stations along lines, (n, 2) each."""
-        stations, t = zip(*(resample(line, STATION_M) for line in lines))
-        number = np.repeat(np.arange(len(lines), dtype=np.int32), [len(one) for one in t])
-        return cls(cKDTree(np.concatenate(stations)), number, np.concatenate(t))
+    def of(cls, lines: Iterable[Polyline], step_m: float) -> Chords:
+        """Cut lines into chords of equal length, at most `step_m`."""
+        return cls.joined([line.resampled(step_m) for line in lines])
 
-    def feet(self, xy: np.ndarray, first: int, reach_m: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    @classmethod
+    def joined(cls, lines: Sequence[Polyline]) -> Chords:
+        """Take the segments of lines as chords."""
+        number = np.repeat(np.arange(len(lines), dtype=np.int32), [len(one.xyz) for one in lines])
+        if not lines:
+            return cls(np.empty((0, 3)), number, np.empty(0))
+        return cls(np.concatenate([one.xyz for one in lines]), number, np.concatenate([one.t for one in lines]))
+
+    @cached_property
+    def first(self) -> np.ndarray:
+        """Place at which each chord starts, (m,) int."""
+        return np.flatnonzero(self.line[1:] == self.line[:-1])
+
+    @property
+    def number(self) -> np.ndarray:
+        """Number of the line of each chord, (m,)."""
+        return self.line[self.first]
+
+    @cached_property
+    def start(self) -> np.ndarray:
+        """Where chords start, (m, d)."""
+        return self.xyz[self.first]
+
+    @cached_property
+    def step(self) -> np.ndarray:
+        """Vectors of the chords, (m, d)."""
+        return self.xyz[self.first + 1] - self.start
+
+    @property
+    def middle(self) -> np.ndarray:
+        """Middles of the chords, (m, d)."""
+        return 0.5 * (self.start + self.xyz[self.first + 1])
+
+    @property
+    def middle_t(self) -> np.ndarray:
+        """Chainages of the middles, (m,)."""
+        return 0.5 * (self.t[self.first] + self.t[self.first + 1])
+
+    @property
+    def left(self) -> np.ndarray:
+        """Unit vectors to the left of the chords in plan, (m, 2)."""
+        x, y = self.step[:, 0], self.step[:, 1]
+        return np.column_stack([-y, x]) / np.hypot(x, y)[:, None]
+
+    @property
+    def lengths(self) -> np.ndarray:
+        """Lengths of the chords, (m,): in space where they have heights."""
+        return np.linalg.norm(self.step, axis=1)
+
+    @cached_property
+    def _places(self) -> cKDTree:
+        return cKDTree(self.xyz[:, :2])
+
+    @cached_property
+    def _middles(self) -> cKDTree:
+        return cKDTree(self.middle[:, :2])
+
+    def nearest(self, places: np.ndarray, candidates: int = CANDIDATES) -> tuple[np.ndarray, np.ndarray]:
+        """Return the nearest point in plan on any chord for places, (k, d), and the numbers of these chords, (k,).
+
+        Of the chords with the nearest middles, as many as `candidates` are tried.
+        """
+        xy = places[:, :2]
+        _, tried = self._middles.query(xy, k=np.arange(1, min(candidates, len(self.first)) + 1))
+        start, step = self.start[tried], self.step[tried]
+        ahead = np.sum((xy[:, None] - start[..., :2]) * step[..., :2], axis=2)
+        share = np.clip(ahead / np.sum(step[..., :2] ** 2, axis=2), 0, 1)
+        feet = start + share[..., None] * step
+        distance = np.linalg.norm(feet[..., :2] - xy[:, None], axis=2)
+        rows, best = np.arange(len(xy)), np.argmin(distance, axis=1)
+        return feet[rows, best], tried[rows, best]
+
+    def feet(self, xy: np.ndarray, reach_m: float, progress: Progress = SILENT) -> Feet:
+        """Project points, (k, 2), onto the nearest line; points beyond `reach_m` or past a line's end are left out."""
+        if not len(self.xyz) or not len(xy):
+            nothing = np.empty(0)
+            return Feet(nothing.astype(np.int64), nothing.astype(np.int32), nothing, nothing)
+        starts = range(0, len(xy), POINTS_AT_ONCE)
+        found = [self._feet(xy[start : start + POINTS_AT_ONCE], start, reach_m) for start in progress.follow(starts)]
+        point, line, t, across = (np.concatenate(column) for column in zip(*found))
+        order = np.lexsort((t, line))
+        return Feet(point[order], line[order], t[order], across[order])
+
+    def _feet(
+        self, xy: np.ndarray, first: int, reach_m: float
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Return indices of the points in reach (that of `xy[0]` is `first`), and their lines, t and across."""
         workers = threads() if len(xy) > POINTS_FOR_THREADS else 1
-        distance, nearest = self.tree.query(xy, distance_upper_bound=reach_m + STATION_M, workers=workers)
+        distance, nearest = self._places.query(xy, distance_upper_bound=reach_m + STATION_M, workers=workers)
         near = np.flatnonzero(np.isfinite(distance))
         xy, nearest = xy[near], nearest[near]
         before, after = self._foot(xy, nearest - 1), self._foot(xy, nearest)
@@ -230,20 +369,68 @@ class Stations:
         inside = np.abs(across) <= reach_m
         return near[inside] + first, self.line[nearest[inside]], t[inside], across[inside]
 
-    def _foot(self, xy: np.ndarray, segment: np.ndarray) -> np.ndarray:
-        """Return t and across of each point's foot on one segment, (2, k); inf where there is none.
+    def _foot(self, xy: np.ndarray, place: np.ndarray) -> np.ndarray:
+        """Return t and across of each point's foot on the chord from a place, (2, k); inf where there is none.
 
-        A foot may be up to 1 % of the segment's length past its ends, so that no point outside a bend is lost.
+        A foot may be up to 1 % of the chord's length past its ends, so that no point outside a bend is lost.
         """
-        start, end = np.maximum(segment, 0), np.minimum(segment + 1, len(self.t) - 1)
-        a, b = self.tree.data[start], self.tree.data[end]
+        start, end, exists = self._ends(place)
+        a, b = self._places.data[start], self._places.data[end]
         length = self.t[end] - self.t[start]
-        exists = (segment == start) & (self.line[start] == self.line[end]) & (length > 0)
+        exists &= length > 0
         direction = (b - a) / np.where(exists, length, 1.0)[:, None]
         ahead = np.einsum("ij,ij->i", xy - a, direction)
         across = direction[:, 0] * (xy[:, 1] - a[:, 1]) - direction[:, 1] * (xy[:, 0] - a[:, 0])
         is_foot = exists & (ahead > -0.01 * length) & (ahead < 1.01 * length)
         return np.where(is_foot, [self.t[start] + ahead, across], np.inf)
+
+    def _ends(self, place: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return both places of the chords from places, (k,) each, and whether there is such a chord."""
+        start, end = np.maximum(place, 0), np.minimum(place + 1, len(self.t) - 1)
+        return start, end, (place == start) & (place < end) & (self.line[start] == self.line[end])
+
+    def meet(
+        self, stations: np.ndarray, directions: np.ndarray, expected_m: float, max_offset_m: float
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Find the lines in given directions from stations.
+
+        Parameters
+        ----------
+        stations, directions : (k, 2) arrays
+            Places, and unit vectors.
+        expected_m : float
+            Expected distance of the line.
+        max_offset_m : float
+            Maximum deviation from the expected place.
+
+        Returns
+        -------
+        place : (k,) int array
+            Place on a line that is nearest to the expected one.
+        xyz : (k, d) array
+            Where the line is met; NaN where none is.
+        t : (k,) array
+            Chainage there.
+        """
+        off, nearest = self._places.query(stations + expected_m * directions, distance_upper_bound=max_offset_m)
+        nearest = np.where(np.isfinite(off), nearest, 0)
+        xyz, t = np.full((len(stations), self.xyz.shape[1]), np.nan), np.full(len(stations), np.nan)
+        for place in (nearest - 1, nearest):
+            a, b, exists = self._ends(place)
+            left_a, left_b = (cross(directions, self.xyz[one, :2] - stations) for one in (a, b))
+            passed = left_a - left_b
+            share = np.divide(left_a, passed, out=np.full(len(passed), np.inf), where=passed != 0)
+            # A line is extended by a chord, because two rails of a track do not end abreast to the centimetre.
+            met = np.isfinite(off) & exists & (share >= -1) & (share <= 2)
+            share = np.where(met, share, 0.0)
+            xyz = np.where(met[:, None], self.xyz[a] + share[:, None] * (self.xyz[b] - self.xyz[a]), xyz)
+            t = np.where(met, self.t[a] + share * (self.t[b] - self.t[a]), t)
+        return nearest, xyz, t
+
+
+def cross(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Return the cross products of vectors in plan, (k, 2) each, as (k,): how far the other one leads to the left."""
+    return one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0]
 
 
 def runs(marked: np.ndarray) -> list[tuple[int, int]]:

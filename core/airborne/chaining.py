@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..polyline import length_along, project
+from ..polyline import Polyline
 from .search import Finds
 
 AHEAD_M, LEAST_AHEAD_M = 60.0, 6.0
@@ -52,7 +52,7 @@ def chains(finds: Finds) -> Iterator[np.ndarray]:
         if len(chain) < 2:
             continue
         free[_members(line, finds)] = False
-        if len(chain) >= FEW_FINDS and length_along(line)[-1] > MIN_LENGTH_M:
+        if len(chain) >= FEW_FINDS and Polyline(line).length_m > MIN_LENGTH_M:
             yield _continued(line)
 
 
@@ -79,9 +79,9 @@ def _followed(start: int, turn: float, finds: Finds, tree: cKDTree, free: np.nda
 
 def _members(line: np.ndarray, finds: Finds) -> np.ndarray:
     """Return the numbers of the finds that belong to a chain."""
-    feet = project([line], finds.xy, SAME_M)
-    along = length_along(line)
-    segment = np.clip(np.searchsorted(along, feet.t) - 1, 0, len(line) - 2)
+    chain = Polyline(line)
+    feet = chain.feet(finds.xy, SAME_M)
+    segment = np.clip(np.searchsorted(chain.t, feet.t) - 1, 0, len(line) - 2)
     step = line[segment + 1] - line[segment]
     turned = finds.direction[feet.point] - np.arctan2(step[:, 1], step[:, 0])
     turned = np.abs((turned + np.pi / 2) % np.pi - np.pi / 2)

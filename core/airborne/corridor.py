@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .axis import Axis, Points
+from ..polyline import Polyline
+from .axis import Points
 
 SECTION_M = 5.0
 """Length over which the level of the bed is taken."""
@@ -74,9 +75,9 @@ class Corridor:
         return Corridor(t, across, height, strip, self.start_m, self.level)
 
 
-def gather(points: Points, axis: Axis, reach_m: float) -> Corridor | None:
+def gather(points: Points, axis: Polyline, reach_m: float) -> Corridor | None:
     """See points along an axis, up to a distance from it; None if there is no level to see."""
-    t, across = axis.feet(points)
+    t, across = axis.feet_near(points.xyz[:, :2], points.t)
     near = np.abs(across) <= reach_m
     t, across, z = t[near], across[near], points.xyz[near, 2]
     start_m = float(axis.t[0])

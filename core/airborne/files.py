@@ -12,10 +12,11 @@ from ..clouds.points import Request, strips_of
 from ..errors import NoRailPointsError, ParameterError
 from ..frame import LocalFrame
 from ..parameters import AirborneParameters
+from ..polyline import Polyline
 from ..progress import Progress
 from ..standards import STANDARDS
 from ..tasks import Context, Task
-from .axis import Axis, axis_of_guide
+from .axis import axis_of_guide
 from .fitting import EMPTY, SEEN, Fitted, Stations, fit_tracks
 from .remarks import FLIGHT, are_hints, on_density, on_gauges, on_shapes, refuse_mobile
 from .run import Run
@@ -116,9 +117,9 @@ def _check_degrees(request: Request, guides: Sequence[Guide]) -> None:
         )
 
 
-def _axes(guides: Sequence[Guide], request: Request) -> tuple[list[Guide], list[Axis], list[str]]:
+def _axes(guides: Sequence[Guide], request: Request) -> tuple[list[Guide], list[Polyline], list[str]]:
     """Return the guides that are long enough, their axes in metres, and a sentence on those that are not."""
-    kept: list[tuple[Guide, Axis]] = []
+    kept: list[tuple[Guide, Polyline]] = []
     short: list[tuple[Guide, float]] = []
     for guide in guides:
         xy = request.zero.to_local(np.column_stack([guide.xy[:, :2], np.zeros(len(guide.xy))]))[:, :2]
@@ -141,7 +142,7 @@ def _axes(guides: Sequence[Guide], request: Request) -> tuple[list[Guide], list[
     return [guide for guide, _ in kept], [axis for _, axis in kept], left_out
 
 
-def _check_inside(request: Request, axes: Sequence[Axis], reach_m: float) -> None:
+def _check_inside(request: Request, axes: Sequence[Polyline], reach_m: float) -> None:
     """Refuse guides of which none lies in the cloud; headers may state an extent that is not a number."""
     extents = np.array([header.extent for header in request.headers], dtype=float)
     if not np.isfinite(extents).all():
@@ -174,7 +175,7 @@ def fit_square(
     """Fit the pieces of guides in a square; their stations outside of it are dropped. A task."""
     points = points_of(folder, key)
     origin = np.floor(points["xyz"].mean(axis=0))
-    axes = [Axis(piece.axis.xy - origin[:2], piece.axis.t) for piece in pieces]
+    axes = [Polyline(piece.axis.xy - origin[:2], piece.axis.t) for piece in pieces]
     own = [spacings_m[piece.number] for piece in pieces]
     local = points["xyz"] - origin
     strips = strips_of(points["xyz"], points["mark"])
@@ -190,7 +191,7 @@ def fit_square(
 def _shown_otherwise(
     local: np.ndarray,
     strips: np.ndarray,
-    axis: Axis,
+    axis: Polyline,
     spacing_m: float,
     parameters: AirborneParameters,
     progress: Progress,
@@ -221,7 +222,7 @@ def _moved(fitted: Fitted, origin: np.ndarray, piece: Piece) -> Fitted:
 
 def _joined(
     guide: Guide,
-    axis: Axis,
+    axis: Polyline,
     parts: Sequence[tuple[Piece, Fitted]],
     spacing_m: float,
     rail_height_m: float,
@@ -233,7 +234,7 @@ def _joined(
     t = (np.arange(count) + 0.5) * STATION_M
     unknown = np.full(count, np.nan)
     columns = {name: unknown.copy() for name in ("bed", "tilt", "sigma", "sigma_bed")}
-    columns.update(t=t, xy=axis.at(t)[0].copy(), margin=np.zeros(count))
+    columns.update(t=t, xy=axis.at(t), margin=np.zeros(count))
     columns.update(reason=np.full(count, EMPTY), switch=np.zeros(count, dtype=bool))
     for _, one in parts:
         at = np.clip((one.stations.t / STATION_M).astype(np.int64), 0, count - 1)
@@ -249,7 +250,7 @@ def _joined(
     return track_of(guide, Stations(**columns), spacing_m, rail_height_m, frame, others)
 
 
-def _frame(zero: LocalFrame, axes: Sequence[Axis]) -> LocalFrame:
+def _frame(zero: LocalFrame, axes: Sequence[Polyline]) -> LocalFrame:
     """Return the frame of the results, with its origin among the guides."""
     middle = np.append(np.round(np.concatenate([axis.xy for axis in axes]).mean(axis=0)), 0.0)
     return zero.with_origin(middle)

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
+from ..polyline import Polyline
 from ..progress import SILENT, Progress
-from .axis import Axis, Points
+from .axis import Points
 from .beside import LONG, WIDE_M, Beside, look_beside
 from .corridor import gather
 from .course import Course, Evidence, evidence
@@ -22,9 +23,11 @@ from .strips import strip_error
 LONG_GAIN, LONG_SHARE = 7.0, 0.25
 """Gain that two rails must have over 70 m, and the share of the expected gain: roads, hedges and ditches stay below."""
 
-OWN_GAIN, CHANCE = 4.0, 1.5
-"""A section of its own shows a track with this gain, or with one that misses what is expected there by no more than as
-many standard deviations of it: noise gives the expected gain E a standard deviation of the root of 2 E."""
+OWN_GAIN = 4.0
+"""Gain with which a section shows a track by itself."""
+
+CHANCE = 1.5
+"""Standard deviations by which the gain of a section may be below the expected gain E: noise changes it by √(2 E)."""
 
 WIDEST_M = 0.215
 """Ridges this wide are the halves of a road's crown: no survey has the footprint of 0.7 m that would blur rails so."""
@@ -142,7 +145,7 @@ class Fitted:
 def fit_tracks(
     xyz: np.ndarray,
     strip: np.ndarray,
-    axes: Sequence[Axis],
+    axes: Sequence[Polyline],
     spacings_m: Sequence[float],
     reach_m: float,
     footprint_m: float,
@@ -156,7 +159,7 @@ def fit_tracks(
         Points around the guides, metres.
     strip : (n,) int array
         Number of the strip of each.
-    axes : sequence of Axis
+    axes : sequence of Polyline
         The guides.
     spacings_m : sequence of float
         Distance between the middles of the railheads, by guide.
@@ -171,7 +174,7 @@ def fit_tracks(
     near: list[Points] = []
     found: list[tuple[int, Evidence]] = []
     for number, axis in looking.follow(list(enumerate(axes)), len(axes)):
-        near.append(axis.points_near(xyz, strip, reach_m + WIDE_M + HALF_M))
+        near.append(Points.near(axis, xyz, strip, reach_m + WIDE_M + HALF_M))
         corridor = gather(near[number], axis, reach_m + HALF_M + TURNED_M)
         if corridor is not None:
             found.append((number, evidence(corridor, reach_m, shapes[number])))
@@ -205,7 +208,7 @@ class _Line:
         return cls(refined, course, sure, beside)
 
 
-def _judged(axes: Sequence[Axis], lines: dict[int, _Line], footprint_m: float) -> list[Fitted]:
+def _judged(axes: Sequence[Polyline], lines: dict[int, _Line], footprint_m: float) -> list[Fitted]:
     """Judge every station of every line, also by the other lines."""
     places = {number: line.refined.curve.xy for number, line in lines.items()}
     judged = []
@@ -236,13 +239,13 @@ def _judged(axes: Sequence[Axis], lines: dict[int, _Line], footprint_m: float) -
     return judged
 
 
-def _nothing(axis: Axis) -> Fitted:
+def _nothing(axis: Polyline) -> Fitted:
     """Return the stations of a guide along which no track was found."""
     t = axis.t[0] + (np.arange(max(int(np.ceil((axis.t[-1] - axis.t[0]) / STATION_M)), 1)) + 0.5) * STATION_M
     unknown = np.full(len(t), np.nan)
     reason = np.full(len(t), HIDDEN)
     stations = Stations(
-        t, axis.at(t)[0], unknown, unknown, unknown, unknown, np.zeros(len(t)), reason, np.zeros(len(t), bool)
+        t, axis.at(t), unknown, unknown, unknown, unknown, np.zeros(len(t)), reason, np.zeros(len(t), bool)
     )
     return Fitted(stations, None, np.nan, np.empty((0, 2)))
 
@@ -305,7 +308,7 @@ REACH_M = 0.24
 """A section whose rails lie at the end of the last search shows none."""
 
 
-def _others(number: int, axes: Sequence[Axis], places: dict[int, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+def _others(number: int, axes: Sequence[Polyline], places: dict[int, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
     """Return the distance of each station from the nearest other line, and how far apart their guides are there."""
     own = places[number]
     distance, apart = np.full(len(own), np.inf), np.full(len(own), np.inf)
@@ -345,8 +348,9 @@ def _unclaimed(number: int, lines: dict[int, _Line], places: dict[int, np.ndarra
         for side in (-1, 1):
             there = np.where(side * line.beside.across > GUIDES_APART_M, score, -np.inf)
             best = int(there.argmax())
-            place, normal = line.refined.line.at(np.array([t]))
-            free = known.query(place + line.beside.across[best] * normal)[0][0] > CLAIMED_M
+            at, across = np.array([t]), line.beside.across[best]
+            place = line.refined.line.at(at) + across * line.refined.line.left_at(at)
+            free = known.query(place)[0][0] > CLAIMED_M
             if own > OTHER_GAIN and there[best] > max(OTHER_GAIN, OTHER_SHARE * own) and free:
-                found.append((t, float(line.beside.across[best])))
+                found.append((t, float(across)))
     return np.array(found).reshape(-1, 2)

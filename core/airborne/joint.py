@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.spatial import cKDTree
 
-from .axis import Axis
+from ..polyline import Polyline
 from .corridor import SECTION_M
 from .course import GUIDE_M, STEP_M, Course, Evidence, guide_prior, trace
 from .ridges import windows
@@ -29,7 +29,7 @@ LEAST = -6.0
 """Score of places outside of the neighbour's reach."""
 
 
-def courses(axes: Sequence[Axis], found: Sequence[Evidence]) -> tuple[list[Course], list[np.ndarray]]:
+def courses(axes: Sequence[Polyline], found: Sequence[Evidence]) -> tuple[list[Course], list[np.ndarray]]:
     """Find the courses of parallel tracks.
 
     Returns
@@ -50,12 +50,12 @@ def courses(axes: Sequence[Axis], found: Sequence[Evidence]) -> tuple[list[Cours
     return joined, together
 
 
-def groups(axes: Sequence[Axis]) -> list[list[int]]:
+def groups(axes: Sequence[Polyline]) -> list[list[int]]:
     """Return the numbers of the guides whose curves are drawn together: parallel ones, `MOST_TOGETHER` at most."""
     found: list[list[int]] = []
     for number, axis in enumerate(axes):
         for group in found:
-            if len(group) < MOST_TOGETHER and any(parallel(axis.xy, axis.normal, axes[one])[0].any() for one in group):
+            if len(group) < MOST_TOGETHER and any(parallel(axis.xy, axis.normals, axes[one])[0].any() for one in group):
                 group.append(number)
                 break
         else:
@@ -63,10 +63,11 @@ def groups(axes: Sequence[Axis]) -> list[list[int]]:
     return found
 
 
-def _support(number: int, axes: Sequence[Axis], found: Sequence[Evidence]) -> np.ndarray:
+def _support(number: int, axes: Sequence[Polyline], found: Sequence[Evidence]) -> np.ndarray:
     """Return what the neighbours of a guide say about places beside it, (sections, c)."""
     own, sections = axes[number], len(found[number].score)
-    place, normal = own.at(own.t[0] + (np.arange(sections) + 0.5) * SECTION_M)
+    t = own.t[0] + (np.arange(sections) + 0.5) * SECTION_M
+    place, normal = own.at(t), own.left_at(t)
     support = np.zeros((sections, len(found[number].across)))
     for other, evidence in enumerate(found):
         if other == number:
@@ -79,7 +80,7 @@ def _support(number: int, axes: Sequence[Axis], found: Sequence[Evidence]) -> np
     return support
 
 
-def parallel(place: np.ndarray, normal: np.ndarray, other: Axis) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def parallel(place: np.ndarray, normal: np.ndarray, other: Polyline) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return beside which places, (n, 2), with unit vectors to the left, (n, 2), another line is parallel.
 
     Returns
@@ -93,7 +94,7 @@ def parallel(place: np.ndarray, normal: np.ndarray, other: Axis) -> tuple[np.nda
     distance, nearest = cKDTree(other.xy).query(place, distance_upper_bound=FAR_M)
     near = np.isfinite(distance)
     nearest = np.where(near, nearest, 0)
-    cosine = (normal * other.normal[nearest]).sum(axis=1)
+    cosine = (normal * other.normals[nearest]).sum(axis=1)
     near &= (np.abs(cosine) > PARALLEL) & (distance > NEAR_M)
     return near, other.t[nearest], cosine < 0
 

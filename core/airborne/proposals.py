@@ -14,7 +14,7 @@ from ..clouds.points import Request
 from ..disk import writing
 from ..errors import NoRailPointsError, ParameterError
 from ..frame import LocalFrame
-from ..polyline import left_normals, length_along, resample, runs
+from ..polyline import Polyline, runs
 from ..progress import counted
 from ..squares.grid import Key, points_by_square
 from ..tasks import READ_S, Context, Task, in_listed_order
@@ -137,16 +137,16 @@ def _with_neighbours(survey: Survey) -> Iterator[Guide]:
     """Yield guides along the lines that were seen, and along the tracks beside them that have no guide yet."""
     tracks = {track.guide_id: track for track in survey.tracks}
     known: list[np.ndarray] = []
-    beside = []
+    lines, beside = [], []
     for line in sorted(survey.lines, key=lambda one: -one.seen_m):
-        xy = resample(line.xyz[:, :2], STEP_M)[0]
-        if _is_new(xy, known):
+        coarse = Polyline(Polyline(line.xyz[:, :2]).resampled(STEP_M).xyz)
+        if _is_new(coarse.xy, known):
             known.append(line.xyz[:, :2])
-            beside += [xy + one.left_m * left_normals(xy) for one in tracks[line.guide_id].others]
-    lines = [resample(line, STEP_M)[0] for line in known]
+            lines.append(coarse.xy)
+            beside += [coarse.xy + one.left_m * coarse.normals for one in tracks[line.guide_id].others]
     for xy in beside:
         if _is_new(xy, known):
-            known.append(resample(xy, 1.0)[0])
+            known.append(Polyline(xy).resampled(1.0).xyz)
             lines.append(xy)
     for number, xy in enumerate(lines, start=1):
         yield Guide(number, survey.frame.to_crs(np.column_stack([xy, np.zeros(len(xy))]))[:, :2])
@@ -233,22 +233,18 @@ def _distinct(survey: Survey) -> Iterator[ProposedGuide]:
         if known:
             away = cKDTree(np.concatenate(known)).query(line.xyz[:, :2])[0] > APART_M
         for first, last in runs(away):
-            part = line.xyz[first : last + 1]
-            if length_along(part[:, :2])[-1] < MIN_LENGTH_M:
+            part = Polyline(line.xyz[first : last + 1])
+            if part.length_m < MIN_LENGTH_M:
                 continue
-            score = _score(tracks[line.guide_id], part[:, :2])
+            score = _score(tracks[line.guide_id], part)
             if score >= LEAST_SCORE:
                 number += 1
-                yield _proposed(part, number, score)
+                drawn = part.resampled(STEP_M)
+                yield ProposedGuide(drawn.xyz, number, score, Polyline(drawn.xyz).length_m)
         known.append(line.xyz[:, :2])
 
 
-def _score(track: AirborneTrack, part: np.ndarray) -> float:
+def _score(track: AirborneTrack, part: Polyline) -> float:
     """Return the share of the stations along a part of a line on which the track is seen, per cent."""
-    near = cKDTree(part).query(track.xyz[:, :2])[0] < STEP_M / 2
+    near = cKDTree(part.xy).query(track.xyz[:, :2])[0] < STEP_M / 2
     return 100 * float(track.seen[near].mean())
-
-
-def _proposed(part: np.ndarray, number: int, score: float) -> ProposedGuide:
-    xyz = resample(part, STEP_M)[0]
-    return ProposedGuide(xyz, number, score, float(length_along(xyz[:, :2])[-1]))

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..polyline import Polyline
 from .axis import STEP_M as VERTEX_M
-from .axis import Axis, Points
+from .axis import Points
 from .corridor import Corridor, gather
 from .curve import differences, smooth
 from .ridges import HALF_M, Shape
@@ -37,7 +38,7 @@ class Traced:
     ----------
     points : Points
         Around the guide.
-    guide : Axis
+    guide : Polyline
     across : (sections,) array
         Course of the track, see `course.Course`.
     shape : Shape
@@ -45,7 +46,7 @@ class Traced:
     """
 
     points: Points
-    guide: Axis
+    guide: Polyline
     across: np.ndarray
     shape: Shape
 
@@ -56,7 +57,7 @@ class Seen:
 
     Attributes
     ----------
-    axis : Axis
+    axis : Polyline
         The line.
     corridor : Corridor
     shape : Shape
@@ -66,7 +67,7 @@ class Seen:
     sections : Sections
     """
 
-    axis: Axis
+    axis: Polyline
     corridor: Corridor
     shape: Shape
     shown_m: float
@@ -87,7 +88,7 @@ class Refined:
     seen : Seen
         Along the curve before the last round.
     curve : Curve
-    line : Axis
+    line : Polyline
         Through the curve.
     bed, sigma_bed : (n,) arrays
         Height of the bed in the middle of the track, and its standard error.
@@ -95,7 +96,7 @@ class Refined:
 
     seen: Seen
     curve: Curve
-    line: Axis
+    line: Polyline
     bed: np.ndarray
     sigma_bed: np.ndarray
 
@@ -108,7 +109,7 @@ class Refined:
 def refine(tracks: Sequence[Traced]) -> list[Refined | None]:
     """Fit the curves of parallel tracks; None for those of which no section shows a track."""
     lines = {number: _first(track) for number, track in enumerate(tracks)}
-    found: dict[int, tuple[Seen, Curve, Axis]] = {}
+    found: dict[int, tuple[Seen, Curve, Polyline]] = {}
     for reach_m in REACHES_M:
         seen: dict[int, Seen] = {}
         for number, line in lines.items():
@@ -126,16 +127,16 @@ def refine(tracks: Sequence[Traced]) -> list[Refined | None]:
     return [_with_heights(*found[number]) if number in found else None for number in range(len(tracks))]
 
 
-def _first(track: Traced) -> Axis:
+def _first(track: Traced) -> Polyline:
     """Return the line through the course of a track."""
     middles = float(track.guide.t[0]) + (np.arange(len(track.across)) + 0.5) * (STATION_M / 2)
-    place, normal = track.guide.at(middles)
+    place, normal = track.guide.at(middles), track.guide.left_at(middles)
     weight, rows = np.full(len(place), COURSE_M**-2), differences(len(place), 3)
     curve = smooth(place + track.across[:, None] * normal, weight, rows, COURSE_TURN_M)
     return _axis_through(curve.values, middles, track.guide)
 
 
-def _look(track: Traced, line: Axis, last: Seen | None, reach_m: float) -> Seen | None:
+def _look(track: Traced, line: Polyline, last: Seen | None, reach_m: float) -> Seen | None:
     """Measure the ridges along a line and fit its sections; None if none of them shows a track."""
     corridor = gather(track.points, line, HALF_M + MARGIN_M)
     if corridor is None:
@@ -145,7 +146,7 @@ def _look(track: Traced, line: Axis, last: Seen | None, reach_m: float) -> Seen 
     return Seen(line, corridor, shape, shown_m, sections) if sections.shows.any() else None
 
 
-def _with_heights(seen: Seen, curve: Curve, line: Axis) -> Refined:
+def _with_heights(seen: Seen, curve: Curve, line: Polyline) -> Refined:
     """Smooth the heights of the bed as well."""
     sections = seen.sections
     level = sections.found.level + seen.corridor.level_at(seen.t)
@@ -155,16 +156,16 @@ def _with_heights(seen: Seen, curve: Curve, line: Axis) -> Refined:
     return Refined(seen, curve, line, heights.values[:, 0], np.sqrt(heights.variance))
 
 
-def _axis_through(xy: np.ndarray, t: np.ndarray, guide: Axis) -> Axis:
+def _axis_through(xy: np.ndarray, t: np.ndarray, guide: Polyline) -> Polyline:
     """Return an axis through places, (n, 2), at chainages of the guide; it goes on straight to the guide's ends."""
     from scipy.interpolate import CubicSpline
 
     wanted = np.arange(guide.t[0], guide.t[-1] + VERTEX_M / 2, VERTEX_M)
     if len(t) < 2:
-        place, normal = guide.at(t)
-        return Axis(guide.xy + ((xy - place) * normal).sum(axis=1) * guide.normal, guide.t)
+        left_m = ((xy - guide.at(t)) * guide.left_at(t)).sum(axis=1)
+        return Polyline(guide.xy + left_m * guide.normals, guide.t)
     curve = CubicSpline(t, xy, bc_type="natural") if len(t) > 2 else None
     inside = np.clip(wanted, t[0], t[-1])
     if curve is None:
-        return Axis(xy[0] + (wanted - t[0])[:, None] * (xy[1] - xy[0]) / (t[1] - t[0]), wanted)
-    return Axis(curve(inside) + (wanted - inside)[:, None] * curve(inside, 1), wanted)
+        return Polyline(xy[0] + (wanted - t[0])[:, None] * (xy[1] - xy[0]) / (t[1] - t[0]), wanted)
+    return Polyline(curve(inside) + (wanted - inside)[:, None] * curve(inside, 1), wanted)

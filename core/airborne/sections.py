@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .axis import Axis
+from ..polyline import Polyline
 from .corridor import Corridor
 from .ridges import HALF_M, Fit, Shape, binned, fit, windows
 
@@ -71,7 +71,7 @@ class Sections:
     points: np.ndarray
     shows: np.ndarray
 
-    def stations_on(self, line: Axis) -> np.ndarray:
+    def stations_on(self, line: Polyline) -> np.ndarray:
         """Return the chainages of the middles of the sections, (n,), on the line along which they were seen."""
         return float(line.t[0]) + (np.arange(len(self.shows)) + 0.5) * STATION_M
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .axis import Axis
+from ..polyline import Polyline
 from .sections import STATION_M
 
 SIDE_M = 1000.0
@@ -40,41 +40,42 @@ class Piece:
     ----------
     number : int
         Of the guide.
-    axis : Axis
+    axis : Polyline
         With its margins; its first chainage is a multiple of `STATION_M`.
     first_m, last_m : float
         Chainages of the guide between which stations belong to the square.
     """
 
     number: int
-    axis: Axis
+    axis: Polyline
     first_m: float
     last_m: float
 
 
-def pieces_by_square(axes: Sequence[Axis]) -> dict[Key, tuple[Piece, ...]]:
+def pieces_by_square(axes: Sequence[Polyline]) -> dict[Key, tuple[Piece, ...]]:
     """Divide guides into squares."""
     found: dict[Key, list[Piece]] = {}
     for number, axis in enumerate(axes):
         for key, first_m, last_m in _stays(axis):
             low_m = max(np.floor((first_m - MARGIN_M) / STATION_M) * STATION_M, 0.0)
-            piece = Piece(number, axis.part(low_m, last_m + MARGIN_M), first_m, last_m)
-            found.setdefault(key, []).append(piece)
+            inside = slice(*np.searchsorted(axis.t, [low_m, np.nextafter(last_m + MARGIN_M, np.inf)]))
+            around = Polyline(axis.xy[inside], axis.t[inside])
+            found.setdefault(key, []).append(Piece(number, around, first_m, last_m))
     return {key: tuple(pieces) for key, pieces in sorted(found.items())}
 
 
-def _stays(axis: Axis) -> Iterator[tuple[Key, float, float]]:
+def _stays(axis: Polyline) -> Iterator[tuple[Key, float, float]]:
     """Yield each stay of a guide in a square, by the middles of its sections, with the chainages of its ends."""
     count = max(int(np.ceil(axis.t[-1] / STATION_M)), 1)
     middles = (np.arange(count) + 0.5) * STATION_M
-    keys = np.floor(axis.at(middles)[0] / SIDE_M).astype(np.int64)
+    keys = np.floor(axis.at(middles) / SIDE_M).astype(np.int64)
     turns = np.flatnonzero((np.diff(keys, axis=0) != 0).any(axis=1)) + 1
     for run in np.split(np.arange(count), turns):
         key = (int(keys[run[0], 0]), int(keys[run[0], 1]))
         yield key, float(run[0] * STATION_M), float((run[-1] + 1) * STATION_M)
 
 
-def cells_around(axes: Sequence[Axis], reach_m: float) -> np.ndarray:
+def cells_around(axes: Sequence[Polyline], reach_m: float) -> np.ndarray:
     """Return the numbers of the cells within reach of lines, rising."""
     steps = np.arange(-int(np.ceil(reach_m / CELL_M)), int(np.ceil(reach_m / CELL_M)) + 1)
     around = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)

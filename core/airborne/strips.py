@@ -31,7 +31,7 @@ def strip_error(refined: Refined) -> np.ndarray:
     )
     long = np.ones(min(MIXED_SECTIONS, len(error)))
     mixed = np.convolve(one - other, long, "same") / np.maximum(np.convolve(one + other, long, "same"), 1.0)
-    _, normal = seen.axis.at(refined.t)
+    normal = seen.axis.left_at(refined.t)
     return np.abs(mixed * (normal @ _strip_shift(seen, main))) / 2
 
 
@@ -42,7 +42,7 @@ def _strip_shift(seen: Seen, strips: Sequence[int]) -> np.ndarray:
         fits.append(fit_sections(corridor.kept(corridor.strip == strip), seen.shape, REACHES_M[-1], SHIFT_LENGTH_M))
     one, other = fits
     middles = corridor.start_m + (np.arange(len(one.offset)) + 0.5) * SHIFT_LENGTH_M
-    _, normal = seen.axis.at(np.minimum(middles, seen.axis.t[-1]))
+    normal = seen.axis.left_at(np.minimum(middles, seen.axis.t[-1]))
     good = (one.found.gain > ENOUGH_GAIN) & (other.found.gain > ENOUGH_GAIN)
     weight = np.where(good, 1 / (one.sigma**2 + other.sigma**2), 0.0)
     matrix = (normal * weight[:, None]).T @ normal + np.eye(2) / STRIP_SHIFT_M**2

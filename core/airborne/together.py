@@ -11,33 +11,48 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import block_diag, csr_matrix, vstack
 
-from .axis import Axis
+from ..polyline import Polyline, cross
 from .curve import differences, smooth
 from .joint import parallel
 from .sections import STATION_M, Sections
 
-STRAIGHT_M, STRAIGHT_SECTIONS, TURN_SECTIONS = 0.004, 2, 5
-"""Standard deviation of the third differences of a track in plan over 10 m where its curvature does not change, the
-number of sections for which this counts beside what is measured, and the sections over which it is measured: a
-transition is rarely shorter than 50 m."""
+STRAIGHT_M = 0.004
+"""Standard deviation of the third differences of a track in plan, over 10 m, where its curvature does not change."""
 
-APART_M, APART_SECTIONS = 0.004, 5
-"""Standard deviation of the second differences over 10 m of the distance between two tracks, which in a curve of 300 m
-radius turns by as much, and the number of sections for which it counts beside what is measured."""
+STRAIGHT_SECTIONS = 2
+"""Sections for which `STRAIGHT_M` counts beside what is measured."""
+
+TURN_SECTIONS = 5
+"""Sections over which the third differences are measured: a transition is rarely shorter than 50 m."""
+
+APART_M = 0.004
+"""Standard deviation of the second differences, over 10 m, of the distance between two tracks: it changes by as much in
+a curve of 300 m radius."""
+
+APART_SECTIONS = 5
+"""Sections for which `APART_M` counts beside what is measured."""
 
 FIRST_TURN_M, FIRST_APART_M = 0.03, 0.3
 """Standard deviations with which the search for both begins: a curve of 300 m radius whose transition is 60 m long has
 third differences of 0.056 m, the toe of a switch 0.3 m; its tracks part with second differences of 0.3 to 0.5 m."""
 
-CURVE_PASSES, OUTLIER, TRUSTED = 12, 3.0, 0.2
-"""Weightings of the curve, after which it hardly moves, the residual, in standard errors, at which a section has lost
-3/4 of its weight, and the weight above which it states how good the standard errors are."""
+CURVE_PASSES = 12
+"""Weightings of the curve, after which it hardly moves."""
+
+OUTLIER = 3.0
+"""Residual, in standard errors, at which a section has lost 3/4 of its weight."""
+
+TRUSTED = 0.2
+"""Least weight of the sections whose residuals judge the standard errors."""
 
 HOLD_M = 0.3
 """Standard error of the place of a section that is not seen: it stays where the last curve passed."""
 
-FEW_SECTIONS, SPREAD = 5, (0.5, 3.0)
-"""Sections up to which residuals do not say how good the standard errors are, and the limits of what they say."""
+FEW_SECTIONS = 5
+"""Sections up to which residuals do not judge the standard errors."""
+
+SPREAD = (0.5, 3.0)
+"""Limits of the factor by which residuals correct the standard errors."""
 
 TURNED = 0.02
 """Sine of the angle between two lines below which they keep their distance: branches of switches turn by more."""
@@ -64,7 +79,7 @@ class Curve:
     beside: np.ndarray
 
 
-def draw_together(lines: Sequence[Axis], found: Sequence[Sections]) -> list[Curve]:
+def draw_together(lines: Sequence[Polyline], found: Sequence[Sections]) -> list[Curve]:
     """Draw the curves of tracks through their sections.
 
     How much curvature and distance change is measured along the tracks (expectation maximisation of the variance of the
@@ -72,12 +87,13 @@ def draw_together(lines: Sequence[Axis], found: Sequence[Sections]) -> list[Curv
 
     Parameters
     ----------
-    lines : sequence of Axis
+    lines : sequence of Polyline
         On which the sections are seen.
     found : sequence of Sections
     """
     stations = [one.stations_on(line) for line, one in zip(lines, found)]
-    place, normal = (np.concatenate(one) for one in zip(*(line.at(t) for line, t in zip(lines, stations))))
+    place = np.concatenate([line.at(t) for line, t in zip(lines, stations)])
+    normal = np.concatenate([line.left_at(t) for line, t in zip(lines, stations)])
     shows, offset, sigma = (
         np.concatenate([getattr(one, name) for one in found]) for name in ("shows", "offset", "sigma")
     )
@@ -120,7 +136,7 @@ class _Stiffness:
     blocks: list[tuple[int, float, int]]
 
     @classmethod
-    def of(cls, lines: Sequence[Axis], stations: Sequence[np.ndarray]) -> _Stiffness:
+    def of(cls, lines: Sequence[Polyline], stations: Sequence[np.ndarray]) -> _Stiffness:
         """Set up the differences at the stations of lines."""
         own = [differences(len(t), 3) for t in stations]
         apart = list(_distances(lines, stations))
@@ -146,7 +162,7 @@ class _Stiffness:
         return np.cumsum([rows for rows, _, _ in self.blocks])[:-1]
 
 
-def _distances(lines: Sequence[Axis], stations: Sequence[np.ndarray]) -> Iterator[csr_matrix]:
+def _distances(lines: Sequence[Polyline], stations: Sequence[np.ndarray]) -> Iterator[csr_matrix]:
     """Yield the second differences of the distance between each two parallel lines, over the stations of all."""
     first = np.cumsum([0, *map(len, stations)])
     for one in range(len(lines)):
@@ -168,15 +184,14 @@ def _distances(lines: Sequence[Axis], stations: Sequence[np.ndarray]) -> Iterato
                 yield (differences(count, 2) @ across)[whole]
 
 
-def _feet(line: Axis, t: np.ndarray, other: Axis) -> tuple[np.ndarray, np.ndarray]:
+def _feet(line: Polyline, t: np.ndarray, other: Polyline) -> tuple[np.ndarray, np.ndarray]:
     """Return at which stations of a line another one is parallel, (n,) bool, and its chainages there, (n,)."""
-    place, normal = line.at(t)
+    place, normal = line.at(t), line.left_at(t)
     near, feet, _ = parallel(place, normal, other)
     for _ in range(FOOT_ROUNDS):
-        beside, left = other.at(feet)
-        ahead = np.column_stack([left[:, 1], -left[:, 0]])
-        feet = feet + ((place - beside) * ahead).sum(axis=1)
-    return near & (np.abs((normal * ahead).sum(axis=1)) < TURNED), feet
+        left = other.left_at(feet)
+        feet = feet + cross(place - other.at(feet), left)
+    return near & (np.abs(cross(normal, left)) < TURNED), feet
 
 
 def _interpolation(t: np.ndarray, stations: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..polyline import left_normals, length_along, resample
+from ..polyline import Chords, Polyline, cross
 from ..progress import SILENT, Progress
 from ..rails import Kilometres
 from .km_text import write_km
@@ -82,30 +82,24 @@ class Axis:
     stationing: Stationing
 
     @cached_property
-    def along(self) -> np.ndarray:
-        """Plan distance of each vertex from the first, (n,) metres."""
-        return length_along(self.xy)
+    def line(self) -> Polyline:
+        """Chainages, and normals at the vertices."""
+        return Polyline(self.xy)
 
     @cached_property
-    def normals(self) -> np.ndarray:
-        """Unit vectors to the left, (n, 2): at a vertex, of the bisector of its two segments."""
-        return left_normals(self.xy)
-
-    @cached_property
-    def _parts(self) -> tuple[cKDTree, np.ndarray]:
-        """Middles of parts of segments, and the segment of each."""
-        steps = self._steps
-        counts = np.ceil(np.hypot(*steps.T) / PIECE_M).astype(int)
-        segment = np.repeat(np.arange(len(steps)), counts)
-        first = np.repeat(np.cumsum(counts) - counts, counts)
-        share = (np.arange(len(segment)) - first + 0.5) / counts[segment]
-        return cKDTree(self.xy[segment] + share[:, None] * steps[segment]), segment
+    def _parts(self) -> tuple[Chords, np.ndarray]:
+        """Parts of segments, and the segment of each."""
+        counts = np.ceil(np.diff(self.line.t) / PIECE_M).astype(int)
+        segment = np.repeat(np.arange(len(counts)), counts)
+        share = (np.arange(len(segment)) - np.repeat(np.cumsum(counts) - counts, counts)) / counts[segment]
+        xy = np.concatenate([self._place(segment, share), self.xy[-1:]])
+        return Chords.joined([Polyline(xy)]), segment
 
     @cached_property
     def _samples(self) -> tuple[cKDTree, np.ndarray]:
         """Places at equal distances, and their `s`."""
-        places, s = resample(self.xy, SAMPLE_M)
-        return cKDTree(places), s
+        samples = self.line.resampled(SAMPLE_M)
+        return cKDTree(samples.xy), samples.t
 
     def feet(self, xy: np.ndarray) -> Feet:
         """Find the feet of places, (k, 2) metres.
@@ -114,7 +108,8 @@ class Axis:
         next, so that feet move steadily along the axis on both sides of a bend. Where normals cross on the inside of a
         bend, the foot is that of the plain perpendicular.
         """
-        segment, last = self._nearest_segments(xy), len(self.xy) - 2
+        parts, of_part = self._parts
+        segment, last = of_part[parts.nearest(xy, CANDIDATES)[1]], len(self.xy) - 2
         plain, length = self._perpendicular(segment, xy)
         past = np.maximum(np.where(segment == 0, -plain, 0.0), np.where(segment == last, plain - 1, 0.0))
         beyond = length * np.maximum(past, 0.0)
@@ -126,9 +121,9 @@ class Axis:
         on_fan = np.isfinite(away[best, places]) & (beyond <= 0)
         segment = np.where(on_fan, around[best, places], segment)
         share = np.where(on_fan, shares[best, places], np.clip(plain, 0.0, 1.0))
-        side = np.sign(_cross(self._steps[segment], xy - self._place(segment, share)))
+        side = np.sign(cross(self._steps[segment], xy - self._place(segment, share)))
         across = np.sqrt(np.maximum(self._away(segment, share, xy) ** 2 - beyond**2, 0.0))
-        return Feet(self.along[segment] + share * np.diff(self.along)[segment], side * across, beyond)
+        return Feet(self.line.t[segment] + share * np.diff(self.line.t)[segment], side * across, beyond)
 
     @cached_property
     def _steps(self) -> np.ndarray:
@@ -141,18 +136,6 @@ class Axis:
         length = np.hypot(*step.T)
         return np.einsum("ij,ij->i", xy - self.xy[segment], step) / length**2, length
 
-    def _nearest_segments(self, xy: np.ndarray) -> np.ndarray:
-        """Return the number of the nearest segment for each place, (k,)."""
-        tree, segments = self._parts
-        count = min(CANDIDATES, len(segments))
-        _, parts = tree.query(xy, k=np.arange(1, count + 1))
-        candidates = segments[parts]
-        start, step = self.xy[candidates], self._steps[candidates]
-        ahead = np.sum((xy[:, None] - start) * step, axis=2) / np.sum(step**2, axis=2)
-        feet = start + np.clip(ahead, 0.0, 1.0)[..., None] * step
-        distance = np.linalg.norm(feet - xy[:, None], axis=2)
-        return candidates[np.arange(len(xy)), np.argmin(distance, axis=1)]
-
     def _fan(self, segment: np.ndarray, xy: np.ndarray) -> np.ndarray:
         """Return the share of segments at which the normal passes through places, (k,); NaN where none does.
 
@@ -161,10 +144,10 @@ class Axis:
         that stays where e vanishes is the foot.
         """
         away, step = xy - self.xy[segment], self._steps[segment]
-        normal = self.normals[segment]
-        turn = self.normals[segment + 1] - normal
-        constant, square = _cross(away, normal), -_cross(step, turn)
-        linear = _cross(away, turn) - _cross(step, normal)
+        normal = self.line.normals[segment]
+        turn = self.line.normals[segment + 1] - normal
+        constant, square = cross(away, normal), -cross(step, turn)
+        linear = cross(away, turn) - cross(step, normal)
         with np.errstate(invalid="ignore", divide="ignore"):
             root = np.sqrt(linear**2 - 4 * square * constant)
             return -2 * constant / (linear + np.sign(linear) * root)
@@ -202,7 +185,8 @@ class Axis:
         before = np.where(np.append(False, follows), np.append(np.inf, distance[:-1]), np.inf)
         after = np.where(np.append(follows, False), np.append(distance[1:], np.inf), np.inf)
         feet = ids[(distance <= before) & (distance <= after) & (np.abs(s[ids] - foot) >= APART_M)]
-        return any(_distance_to_chords(place, tree.data[max(at - 1, 0) : at + 2]) < reach_m for at in feet)
+        around = (Chords.joined([Polyline(tree.data[max(at - 1, 0) : at + 2])]) for at in feet)
+        return any(np.linalg.norm(chords.nearest(place[None])[0] - place) < reach_m for chords in around)
 
 
 def locate(axes: Sequence[Axis], xy: np.ndarray, notation: str, progress: Progress = SILENT) -> Kilometres:
@@ -308,15 +292,3 @@ def nearest(axes: Sequence[Axis], xy: np.ndarray, beyond_m: float, progress: Pro
         if len(mine):
             found.put(number, mine, axis.feet(xy[mine]), beyond_m)
     return found
-
-
-def _distance_to_chords(place: np.ndarray, chain: np.ndarray) -> float:
-    """Return the distance of a place, (2,), from a polyline, (n, 2)."""
-    step = np.diff(chain, axis=0)
-    share = np.clip(np.sum((place - chain[:-1]) * step, axis=1) / np.sum(step**2, axis=1), 0.0, 1.0)
-    return float(np.linalg.norm(chain[:-1] + share[:, None] * step - place, axis=1).min())
-
-
-def _cross(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """Return the cross products of vectors, (k, 2) each, as (k,)."""
-    return one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0]

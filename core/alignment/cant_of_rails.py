@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..polyline import distance_to, length_along, project, resample
+from ..polyline import Polyline, distance_to
 
 STEP_M = 1.0
 """Distance between the places at which the cant is taken, metres."""
@@ -33,12 +33,13 @@ def cant_of_rails(line: np.ndarray, rails: Sequence[np.ndarray]) -> np.ndarray:
     (m, 2) array
         Plan distance from the first vertex, and cant, metres.
     """
-    places = np.concatenate([resample(rail, STEP_M)[0] for rail in rails]) if rails else np.zeros((0, 3))
+    places = np.concatenate([Polyline(rail).resampled(STEP_M).xyz for rail in rails]) if rails else np.zeros((0, 3))
     places = places[np.isfinite(places[:, 2])]
     if not len(places):
         return np.zeros((0, 2))
-    feet = project([line[:, :2]], places[:, :2], FARTHEST_M)
-    t = np.arange(0.0, length_along(line[:, :2])[-1], STEP_M)
+    own = Polyline(line)
+    feet = own.feet(places[:, :2], FARTHEST_M)
+    t = np.arange(0.0, own.length_m, STEP_M)
     sides = []
     for side in (1.0, -1.0):
         across = side * feet.across

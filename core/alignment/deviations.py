@@ -9,7 +9,7 @@ from typing import Optional
 import numpy as np
 
 from ..errors import RailExtractError
-from ..polyline import length_along
+from ..polyline import Polyline
 from ..progress import Progress
 from .elements import Alignment
 from .equations import SAME_PLACE_M
@@ -87,7 +87,7 @@ def compared_with(
         if alignment is None:
             lost.append(str(track.track_id))
             continue
-        along = length_along(track.xyz[:, :2])
+        along = Polyline(track.xyz).t
         found.append((alignment, deviations_of(alignment, track.track_id, track.xyz, along, track.cant)))
     if not found:
         raise RailExtractError("None of TRACKS lies along an alignment of INPUT: check the coordinate system of both.")

@@ -12,7 +12,7 @@ import numpy as np
 from ..errors import ParameterError
 from ..frame import LocalFrame
 from ..parameters import JUMPS, FitParameters
-from ..polyline import length_along, runs
+from ..polyline import Polyline, runs
 from ..progress import SILENT, Progress
 from .chain import Chain
 from .deviations import Deviations, deviations_of
@@ -130,7 +130,7 @@ def fit_tracks(
     """
     if fixed and not any(track.track_id in fixed for track in tracks):
         raise ParameterError("FIXED has no elements of the tracks in INPUT: give the table of these tracks.")
-    shares = progress.divide([float(length_along(track.xyz[:, :2])[-1]) + 1.0 for track in tracks])
+    shares = progress.divide([Polyline(track.xyz).length_m + 1.0 for track in tracks])
     fits: list[Fit] = []
     lines = Counter(track.track_id for track in tracks)
     refusals = [_in_pieces(number, count) for number, count in lines.items() if count > 1]

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..polyline import length_along
+from ..polyline import Polyline
 
 SPACING_M = 1.0
 """Least distance of the points, metres: errors of 2 mm lengthen a line with closer points by 1 in 10,000."""
@@ -28,7 +28,7 @@ def groups(xy: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     starts, counts : (k,) int array
         First vertex of each group, and its number of vertices. The first and the last vertex are groups of their own.
     """
-    s = length_along(xy)
+    s = Polyline(xy).t
     number = np.floor((s + 0.5 * SPACING_M) / SPACING_M).astype(int)
     number[0], number[-1] = -1, number[-1] + 1
     starts = np.flatnonzero(np.diff(number, prepend=-2))

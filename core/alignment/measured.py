@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import ParameterError
-from ..polyline import is_closed, length_along, runs
+from ..polyline import Polyline, runs
 from ..progress import Progress, counted
 from .intrinsic import groups, lateral_signal
 from .noise import strays
@@ -64,7 +64,7 @@ def with_stations(track_id: int, xyz: np.ndarray, stations: np.ndarray) -> Track
     known = np.isfinite(stations[:, 1]) & (stations[:, 2] == 0)
     bridged = np.zeros(len(xyz), dtype=bool)
     if len(stations):
-        at = np.clip(np.searchsorted(stations[:, 0], length_along(xyz[:, :2])), 0, len(stations) - 1)
+        at = np.clip(np.searchsorted(stations[:, 0], Polyline(xyz).t), 0, len(stations) - 1)
         bridged = stations[at, 2] != 0
     return Track(track_id, xyz, stations[known][:, :2], bridged)
 
@@ -212,9 +212,9 @@ def _check(track: Track) -> None:
     name, xy = f"The line of track {track.track_id}", track.xyz[:, :2]
     if np.isnan(track.xyz[:, 2]).any():
         raise ParameterError(f"{name} has no heights: give a 3D line, such as a centerline of Extract rails.")
-    if is_closed(xy):
+    if Polyline(xy).is_closed:
         raise ParameterError(f"{name} ends where it begins: cut the ring into two lines.")
-    length = length_along(xy)[-1]
+    length = Polyline(xy).length_m
     if length < LEAST_TRACK_M or len(xy) < LEAST_POINTS:
         remedy = "leave it out, or join it with the track that continues it"
         if length >= LEAST_TRACK_M:
@@ -228,7 +228,7 @@ def _check(track: Track) -> None:
 def _points(track: Track) -> Measured:
     """Return the points of a track."""
     starts, counts = groups(track.xyz[:, :2])
-    along = length_along(track.xyz[:, :2])
+    along = Polyline(track.xyz).t
     sums = np.add.reduceat(np.column_stack([track.xyz, along, ~track.is_bridged]), starts)
     made = Measured(sums[:, :3] / counts[:, None], sums[:, 3] / counts, sums[:, 4], np.zeros((len(starts), 2), bool))
     step = np.diff(made.xyz[:, :2], axis=0)

@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 from ..design_numbers import KM, LENGTH, NUMBER, checked
 from ..design_places import check_places
 from ..errors import RailExtractError
-from ..polyline import length_along
+from ..polyline import Polyline
 from .axis import Axis, nearest
 from .stationing import Jump, Stationing, stationing_of
 
@@ -114,7 +114,7 @@ def make_axes(
     if start is not None:
         (line,) = joined
         turned = _directed(line, start.decreasing)
-        length_m = float(length_along(turned.xy)[-1])
+        length_m = Polyline(turned.xy).length_m
         numbered = stationing_of(length_m, [length_m if start.decreasing else 0.0], [start.km], jumps)
         return _told([Axis(line.name, turned.xy, numbered)])
     if jumps:
@@ -129,7 +129,7 @@ def _check(lines: Sequence[AxisLine], start: Start | None, posts: Sequence[Post]
         check_places(line.xy, where)
         for m in line.m[~(np.isnan(line.m) | (np.abs(line.m) <= NUMBER.high))][:1]:
             checked(float(m), NUMBER, where, "M value")
-        checked(float(length_along(line.xy)[-1]), LENGTH, where, "length")
+        checked(Polyline(line.xy).length_m, LENGTH, where, "length")
     if start is not None:
         checked(start.km, KM, "AXIS", "START_KM")
     for post in posts:
@@ -184,7 +184,7 @@ def _directed(line: AxisLine, backwards: bool) -> AxisLine:
 def _by_measures(line: AxisLine) -> Axis:
     """Give a line its kilometres by its M values; a repeated vertex with another value is a jump."""
     known = np.isfinite(line.m)
-    s, m = length_along(line.xy)[known], line.m[known]
+    s, m = Polyline(line.xy).t[known], line.m[known]
     rise, way = np.abs(np.diff(m)), np.diff(s)
     if known.sum() < 2 or not (way > 0).any():
         raise RailExtractError(
@@ -198,7 +198,7 @@ def _by_measures(line: AxisLine) -> Axis:
             "fill in START_KM, or correct them."
         )
     backwards = bool(np.sum(np.sign(np.diff(m))) < 0)
-    length_m = float(length_along(line.xy)[-1])
+    length_m = Polyline(line.xy).length_m
     if backwards:
         s, m = length_m - s[::-1], m[::-1]
     return Axis(line.name, _directed(line, backwards).xy, stationing_of(length_m, s.tolist(), (unit_km * m).tolist()))
@@ -232,7 +232,7 @@ def _numbered(axis: Axis, s: np.ndarray, km: np.ndarray, jumps: Sequence[Jump]) 
             f"The axis {axis.name} has one post, which does not show where kilometres increase: give a second one."
         )
     backwards = bool(np.sum(np.sign(np.diff(km))) < 0)
-    length_m = float(axis.along[-1])
+    length_m = axis.line.length_m
     if backwards:
         s, km = length_m - s[::-1], km[::-1]
     xy = axis.xy[::-1] if backwards else axis.xy

@@ -16,7 +16,7 @@ from ..classify.sharpness import search_alike
 from ..classify.square import classify_square
 from ..clouds.points import Request
 from ..errors import CloudError, ParameterError
-from ..heads.head_points import near_lines
+from ..heads.head_points import judged
 from ..heads.roads import MIN_WIDER_M
 from ..heads.sections import likelier_width
 from ..parameters import Parameters
@@ -230,7 +230,7 @@ def head_widths(
     measured = measure_spacings(_middle(xyz)).most_common()
     lines = [rail.xyz[:, :2] - points.frame.shift_to(source.frame)[:2] for rail in rails]
     stated_m = gauges[0][1] if measured is None else width_at(measured[0], gauges)
-    if any(points.is_blunt for points in near_lines(lines, xyz, stated_m)):
+    if judged(points, lines, stated_m).blunt:
         progress.warning(
             f"Heads are blunt: the points show round ridges without edges where heads of {1000 * stated_m:.0f} mm are, "
             "as matched images and wide beams do. Lines follow the crests, and sigma_mm and sigmaz_mm state how far "

@@ -39,8 +39,8 @@ SINGLE_SLOPE = 0.4
 slope is hidden, its crest looks like a bar."""
 
 NOISE_ACROSS_M = 0.01
-"""Distance beyond the side of a head within which the top of a cell counts towards its axis: less than half the gap
-to a guard rail, from which on the axis would lie between both."""
+"""Largest distance beyond the side of a head at which the top of a cell counts towards its axis. With half the gap to
+a guard rail, the axis would lie between both rails."""
 
 
 @dataclass(frozen=True)

@@ -50,6 +50,8 @@ class RailPoints:
         Number of the strip, a pass of the scanner, that each point belongs to; None if all points are of one strip.
     found : bool
         Whether they were found in a raw cloud, on heads; a class of a file may hold whole rails.
+    blunt : bool or None
+        Whether the cloud blunts heads, as its lines have shown; None before there are any.
     """
 
     xyz: np.ndarray
@@ -57,6 +59,7 @@ class RailPoints:
     class_code: int
     strips: np.ndarray | None = None
     found: bool = False
+    blunt: bool | None = None
 
     def kept(self, which: np.ndarray) -> RailPoints:
         """Return some of the points, by a mask (n,) bool or by their numbers (k,)."""

@@ -71,7 +71,7 @@ def _parts(fact: Any) -> Iterable[bytes]:
     elif isinstance(fact, SpooledPoints):
         # The folders of the points are named after size and time of the files that the points come from.
         yield from _parts(sorted(Path(file).parts[-2:] for files in fact.files.values() for file in files))
-        yield from _parts(fact.passes)
+        yield from _parts((fact.passes, fact.blunt))
     elif is_dataclass(fact):
         for field in fields(fact):
             yield from _parts(getattr(fact, field.name))

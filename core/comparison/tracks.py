@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 
 from ..parameters import ComparisonParameters
-from ..polyline import interpolate, left_normals, length_along, runs
+from ..polyline import Chords, Polyline, cross, runs
 from ..progress import SILENT, Progress
 from ..rails import RailLine, cell_borders
 from ..tracks.parallels import most_common_spacing
-from .pieces import Pieces, cut, nearest, spacing_and_cant
+from .pieces import cut, spacing_and_cant
 from .shift import Shift, find_shift
 
 BOTH, MISSING, EXTRA = "both", "missing", "extra"
@@ -231,10 +231,10 @@ def compare_surveys(
     progress : Progress
     """
     own, others = (cut([line.xyz for line in survey.lines]) for survey in (reference, other))
-    pieces = own, others
-    gauges = _Gauges.of(reference, other, pieces)
+    chords = own, others
+    gauges = _Gauges.of(reference, other, chords)
     lines = [
-        _compare(line, number, pieces, other, gauges, settings, progress)
+        _compare(line, number, chords, other, gauges, settings, progress)
         for number, line in enumerate(progress.span(0, 0.8).follow(reference.lines))
     ]
     every = [np.concatenate([getattr(one, name) for one in lines]) for name in ("across_mm", "height_mm", "left")]
@@ -245,7 +245,7 @@ def compare_surveys(
     estimated = any(map(_is_estimated, lines, ours_m))
     lines = [_judged(*one, scatter_m, settings.ignore_shift) for one in zip(lines, ours_m)]
     extra = [
-        _extra(line, number, pieces, settings, progress)
+        _extra(line, number, chords, settings, progress)
         for number, line in enumerate(progress.span(0.8, 1).follow(other.lines))
     ]
     return TrackComparison((*lines, *filter(None, extra)), shift, scatter_m[0] if estimated else np.nan)
@@ -253,10 +253,9 @@ def compare_surveys(
 
 def _stations(line: np.ndarray, step_m: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return chainages, (n,), places, (n, 3), and unit vectors to the left, (n, 2); the last is the line's end."""
-    along = length_along(line[:, :2])
-    t = np.append(np.arange(max(round(along[-1] / step_m), 1)) * step_m, along[-1])
-    normals = interpolate(left_normals(line), along, t)
-    return t, interpolate(line, along, t), normals / np.linalg.norm(normals, axis=1, keepdims=True)
+    own = Polyline(line)
+    t = np.append(np.arange(max(round(own.length_m / step_m), 1)) * step_m, own.length_m)
+    return t, own.at(t), own.left_at(t)
 
 
 def _parts(count: int, progress: Progress) -> Iterator[slice]:
@@ -267,27 +266,27 @@ def _parts(count: int, progress: Progress) -> Iterator[slice]:
 
 
 def _paired(
-    places: np.ndarray, left: np.ndarray, number: int, pieces: tuple[Pieces, Pieces], reach_m: float
+    places: np.ndarray, left: np.ndarray, number: int, chords: tuple[Chords, Chords], reach_m: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the places on the other survey's lines, (n, 3), NaN without one, and the numbers of these lines, (n,)."""
-    own, others = pieces
-    if not len(others.start):
+    own, others = chords
+    if not len(others.xyz):
         return np.full((len(places), 3), np.nan), np.full(len(places), -1)
-    feet, piece = nearest(places, others)
+    feet, chord = others.nearest(places)
     step = (feet - places)[:, :2]
     across = np.sum(step * left, axis=1)
-    along = np.abs(step[:, 1] * left[:, 0] - step[:, 0] * left[:, 1])
-    _, back = nearest(feet, own)
-    course = (others.end[piece] - others.start[piece])[:, :2]
+    along = np.abs(cross(left, step))
+    _, back = own.nearest(feet)
+    course = others.step[chord, :2]
     parallel = np.abs(np.sum(course * left, axis=1)) <= MAX_SINE * np.linalg.norm(course, axis=1)
     same = parallel & (np.abs(across) <= reach_m) & (along <= SKEWED_M) & (own.number[back] == number)
-    return np.where(same[:, None], feet, np.nan), np.where(same, others.number[piece], -1)
+    return np.where(same[:, None], feet, np.nan), np.where(same, others.number[chord], -1)
 
 
 def _compare(
     line: SurveyedLine,
     number: int,
-    pieces: tuple[Pieces, Pieces],
+    chords: tuple[Chords, Chords],
     other: Survey,
     gauges: _Gauges,
     settings: ComparisonParameters,
@@ -297,7 +296,7 @@ def _compare(
     t, places, left = _stations(line.xyz, settings.step_m)
     parts = []
     for part in _parts(len(t), progress):
-        feet, found = _paired(places[part], left[part], number, pieces, settings.reach_m)
+        feet, found = _paired(places[part], left[part], number, chords, settings.reach_m)
         step = feet - places[part]
         parts.append((step, found, *gauges.differences(line, places[part, :2], left[part], step[:, :2])))
     step, found, gauge_m, cant_m = (np.concatenate(column) for column in zip(*parts))
@@ -356,11 +355,11 @@ def _is_estimated(line: LineDifferences, ours_m: tuple[float, float]) -> bool:
 
 
 def _extra(
-    line: SurveyedLine, number: int, pieces: tuple[Pieces, Pieces], settings: ComparisonParameters, progress: Progress
+    line: SurveyedLine, number: int, chords: tuple[Chords, Chords], settings: ComparisonParameters, progress: Progress
 ) -> LineDifferences | None:
     """Return the stations of a line of the other survey that the reference does not have; None if it has all."""
     t, places, left = _stations(line.xyz, settings.step_m)
-    turned = pieces[1], pieces[0]
+    turned = chords[1], chords[0]
     parts = _parts(len(t), progress)
     found = np.concatenate([_paired(places[p], left[p], number, turned, settings.reach_m)[1] for p in parts])
     if (found >= 0).all():
@@ -377,19 +376,19 @@ def _extra(
 class _Gauges:
     """The rails of both surveys, and the distance of the two rails of most tracks; None if it is unknown."""
 
-    pieces: tuple[Pieces, Pieces]
+    chords: tuple[Chords, Chords]
     spacing_m: float | None
 
     @classmethod
-    def of(cls, reference: Survey, other: Survey, pieces: tuple[Pieces, Pieces]) -> _Gauges:
+    def of(cls, reference: Survey, other: Survey, chords: tuple[Chords, Chords]) -> _Gauges:
         """Take the rails of the surveys, or their lines if these may be rails."""
         if reference.rails and other.rails:
             before, after = (cut([rail.xyz for rail in survey.rails]) for survey in (reference, other))
             return cls((before, after), most_common_spacing(reference.rails, MIN_PAIRED_M))
         if not all(line.is_rail for line in (*reference.lines, *other.lines)):
-            return cls(pieces, None)
+            return cls(chords, None)
         lines = [RailLine(line.xyz, line.number, 0, 0, np.nan, np.nan, np.nan) for line in reference.lines]
-        return cls(pieces, most_common_spacing(lines, MIN_PAIRED_M))
+        return cls(chords, most_common_spacing(lines, MIN_PAIRED_M))
 
     def differences(
         self, line: SurveyedLine, places: np.ndarray, left: np.ndarray, step: np.ndarray
@@ -400,10 +399,10 @@ class _Gauges:
             return changes[:, 0], changes[:, 1]
         for to_left, to_right in ((0.5, 0.5),) if not line.is_rail else ((0.0, 1.0), (1.0, 0.0)):
             to_left_m, to_right_m = to_left * self.spacing_m * left, to_right * self.spacing_m * left
-            before = spacing_and_cant(places + to_left_m, places - to_right_m, self.pieces[0])
+            before = spacing_and_cant(places + to_left_m, places - to_right_m, self.chords[0])
             known = np.isfinite(step[:, 0]) & np.isnan(changes[:, 0])
             moved = places + np.nan_to_num(step)
-            after = spacing_and_cant(moved + to_left_m, moved - to_right_m, self.pieces[1])
+            after = spacing_and_cant(moved + to_left_m, moved - to_right_m, self.chords[1])
             changes = np.where(known[:, None], after - before, changes)
         return changes[:, 0], changes[:, 1]
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from ..polyline import Stations
+from ..polyline import Polyline
 from ..progress import SILENT, Progress
 from .follow import Reason
 from .growth import Growth, Stop, grow_from
@@ -34,7 +34,7 @@ class Growths:
     def __init__(self, points: OnHeads, settings: GrowSettings) -> None:
         self._points, self._settings = points, settings
         self._on_m = ON_HEAD * settings.head_width_m
-        self._rails: list[tuple[int, Stations]] = []
+        self._rails: list[tuple[int, Polyline]] = []
         self._boxes = np.empty((0, 2, 2))
         self._known: dict[tuple[float, ...], bool] = {}
         self._passed: list[np.ndarray] = []
@@ -88,7 +88,7 @@ class Growths:
         if growth is None:
             return False
         axes = [rail.xyz[:, :2] for rail in growth.rails]
-        self._rails += [(len(self.grown), Stations.along([axis])) for axis in axes]
+        self._rails += [(len(self.grown), Polyline(axis)) for axis in axes]
         self._boxes = np.concatenate([self._boxes, [[axis.min(axis=0), axis.max(axis=0)] for axis in axes]])
         self.grown.append(growth)
         return True
@@ -105,4 +105,4 @@ class Growths:
         """Return the numbers of the growths that have a rail at a place, (2,)."""
         near = ((self._boxes[:, 0] <= place + self._on_m) & (self._boxes[:, 1] >= place - self._on_m)).all(axis=1)
         found = (self._rails[at] for at in np.flatnonzero(near))
-        return {number for number, axis in found if len(axis.feet(place[None], 0, self._on_m)[0])}
+        return {number for number, axis in found if len(axis.feet(place[None], self._on_m).point)}

@@ -57,7 +57,8 @@ class Shown:
         Offset of the axis to the left of the line, and the inverse of its variance by chance, 1/m²; 0 where these
         points show nothing.
     common_m : float
-        Standard error that more points would not reduce; along an `Axis`, what its course follows of it.
+        Part of the standard error that more points would not reduce. Along an `Axis`: the part of it that its smoothed
+        course keeps.
     outline : Middles
         What the outline of the head shows.
     """

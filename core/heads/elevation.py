@@ -245,7 +245,7 @@ def measure_again(
         In the order given. A rail without points keeps its heights and is a gap from end to end.
     """
     plans = [resample(rail.xyz[:, :2], KNOT_M)[0] for rail in rails]
-    near = near_lines(plans, points.xyz, head_width_m, points.strips, progress.span(0.0, 0.7))
+    near = near_lines(plans, points.xyz, head_width_m, points.strips, progress.span(0.0, 0.7), points.blunt)
     measured = []
     for rail, head in zip(rails, progress.span(0.7, 1.0).follow(near)):
         # Lines from a file are only known to be on their heads, so the head width takes the place of the cell size.
@@ -259,7 +259,7 @@ def measure_again(
 
 
 def _with_strips_of(rail: RailLine, support: Support | None) -> Support | None:
-    """Let a support state the strips as the rail did before, which was measured with more of its surroundings."""
+    """Keep the strips that the rail was measured with before: more of its surroundings were seen then."""
     before = rail.support
     if before is None or before.strips is None or support is None:
         return support

@@ -14,6 +14,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d, uniform_filter1d
 from scipy.spatial import cKDTree
 
+from ..clouds.points import RailPoints
 from ..polyline import interpolate, left_normals, length_along, project
 from ..progress import SILENT, Progress
 from .level import AXIS_SHARE, MIN_NOISE_M, OFF_TOP_SIGMAS, cross_slope, robust_sigma, rough_level
@@ -224,6 +225,7 @@ def near_lines(
     widths: Widths,
     strips: np.ndarray | None = None,
     progress: Progress = SILENT,
+    blunt: bool | None = None,
 ) -> list[HeadPoints]:
     """Find the points of each line.
 
@@ -233,8 +235,8 @@ def near_lines(
     xyz : (n, 3) array
     widths : float or (l,) array
         Width of the heads, of all lines or of each, metres.
-    strips : (n,) int array or None
-        See `RailPoints`.
+    strips, blunt
+        See `RailPoints`; if it is not known whether the cloud blunts heads, these lines show it.
     progress : Progress
     """
     feet = project(lines, xyz[:, :2], HALF_RANGE_BINS / (2 * HALF_HEAD_BINS) * widest(widths), progress)
@@ -245,8 +247,15 @@ def near_lines(
         mine = slice(*np.searchsorted(feet.line, [number, number + 1]))
         strip = None if own is None else own[mine]
         heads.append(HeadPoints(feet.t[mine], feet.across[mine], z[mine], width_m, lines[number], free[number], strip))
-    is_blunt = _are_blunt(heads)
+    is_blunt = _are_blunt(heads) if blunt is None else blunt
     return [replace(head, is_blunt=is_blunt) for head in heads]
+
+
+def judged(points: RailPoints, lines: Sequence[np.ndarray], widths: Widths) -> RailPoints:
+    """Return points that know whether their cloud blunts heads, by lines, (k, 2) each, if it is not known yet."""
+    if points.blunt is not None or not lines:
+        return points
+    return replace(points, blunt=near_lines(lines, points.xyz, widths)[0].is_blunt)
 
 
 def _are_blunt(heads: Sequence[HeadPoints]) -> bool:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import binary_opening
 
+from ..clouds.points import RailPoints
 from ..lines.smoothing import smooth_profile
 from ..polyline import interpolate, left_normals, project
 from .head_points import HALF_HEAD_BINS, HALF_RANGE_BINS, STATION_STEP_M, HeadPoints, near_lines
@@ -71,7 +72,7 @@ def hidden_edges(points: HeadPoints) -> np.ndarray:
 
 
 def onto_heads(
-    lines: Sequence[np.ndarray], xyz: np.ndarray, heads_m: np.ndarray, spacings_m: Sequence[float]
+    lines: Sequence[np.ndarray], points: RailPoints, heads_m: np.ndarray, spacings_m: Sequence[float]
 ) -> tuple[np.ndarray, ...]:
     """Move lines in the middle of road and head onto the heads, where one end of the band is at gauge.
 
@@ -79,8 +80,7 @@ def onto_heads(
     ----------
     lines : sequence of (n, 2) arrays
         Smoothed lines.
-    xyz : (k, 3) array
-        Points.
+    points : RailPoints
     heads_m : (n,) array
         Width of the head of each line.
     spacings_m : sequence of float
@@ -91,7 +91,8 @@ def onto_heads(
     tuple of (n, 2) arrays
         Other lines stay as they are.
     """
-    either = [_on_either_end(on_own_level(points)) for points in near_lines(lines, xyz, heads_m)]
+    near = near_lines(lines, points.xyz, heads_m, blunt=points.blunt)
+    either = [_on_either_end(on_own_level(head)) for head in near]
     candidates = [(line,) if band is None else band.lines for line, band in zip(lines, either)]
     return tuple(
         _at_gauge(line, band, candidates[:number] + candidates[number + 1 :], spacings_m)

@@ -19,16 +19,22 @@ from .outline import CROWN_RADIUS_M, MIN_NOISE_M, Grid, Outline, Scores, Section
 MIN_SECTION_POINTS = 250
 """Points that a section needs for its parts to be told apart."""
 
-PULL_M, PULL_DOUBT = 0.028, 0.3
-"""Distance by which the middles at the ends of a section are pulled, per change of the share of points on the left from
-one half to the other, and how well that is known: 22 to 36 mm, on branches seen from above first and at 40° then."""
+PULL_M = 0.028
+"""Displacement of the middles at both ends of a section where the scanner's view of the head changes along it, metres
+per change of the share of points on the left between its halves: 22 to 36 mm on simulated branches that are seen from
+above at one end and at 40° at the other."""
 
-CHANGE_SIGMAS, MEDIAN_SIGMA = 1.0, 1.25
-"""Standard errors of a change of this share up to which chance explains it, and standard error of a median, relative to
-that of a mean."""
+PULL_DOUBT = 0.3
+"""Standard error of that displacement, as a share of it: the same branches."""
+
+CHANGE_SIGMAS = 1.0
+"""Change of that share, in standard errors, that counts as chance."""
+
+MEDIAN_SIGMA = 1.25
+"""Standard error of a median, relative to the standard error of a mean."""
 
 MAX_CHANGE = 0.2
-"""Change of this share from which it is not the view that changes: half of the head is in the shadow of something."""
+"""Largest change of that share that a change of the view explains: a larger one is the shadow of something."""
 
 SHARE_STATIONS = 8
 """Stations, 2 m, in which the share of points on the left is found; their median is that of the half."""
@@ -42,25 +48,38 @@ MAX_SECTION_SHIFT_M = 0.02
 COURSE_STATIONS = 33
 """Stations, 8.25 m, in whose windows the course of a line about its head is found."""
 
-WRONG_WIDTH_M, MAX_WRONG_WIDTH_M = 0.004, 0.015
-"""Error of the width from which another outline is fitted: standards differ by a millimetre; and from which the points
-show something else than a head."""
+WRONG_WIDTH_M = 0.004
+"""Error of the width above which another outline is fitted: standards differ by a millimetre."""
+
+MAX_WRONG_WIDTH_M = 0.015
+"""Error of the width above which the points show something else than a head."""
 
 MAX_HEAD_WIDTH_M = 0.078
 """Widest head that is fitted: the widest of the standards has 77.8 mm. Heads that are flat to their edges look 10 mm
 too wide, and their axis would be wherever the scanner seems to look from."""
 
-SETTLED_WIDTH_M, WIDTH_ROUNDS = 0.0005, 5
-"""Change of the width at which this ends, and most rounds; each finds two thirds of what is left."""
+SETTLED_WIDTH_M = 0.0005
+"""Change of the width at which the search for it ends."""
 
-BLURRED_M, BLURRED_RATIO = 0.0037, 1.35
-"""Blur of the edges beyond the noise in height, and ratio of the noise across to that in height, from which a head is
-blurred. Worn corners blur edges by 2 mm, and the two noises of a scanner differ by a fifth."""
+WIDTH_ROUNDS = 5
+"""Most rounds of the search for the width; each finds two thirds of what is left."""
 
-FLAT_SHARE, TWO_LEVELS, APART_M = 0.3, -0.4, 0.003
-"""Part of the head's width to either side of its axis that has no corners; excess kurtosis of the heights there from
-which they are on two levels, and half the least distance of these. Noise has 0 or more, and two passes -2 (d² / (d² +
-noise²))², at half their distance d: -0.5 where d is the noise. Heights rounded to half of it have -0.1."""
+BLURRED_M = 0.0037
+"""Blur of the edges, beyond the noise in height, of a head that is blurred: worn corners blur edges by 2 mm."""
+
+BLURRED_RATIO = 1.35
+"""Ratio of the noise across to the noise in height of a head that is blurred: those of a scanner differ by a fifth."""
+
+FLAT_SHARE = 0.3
+"""Part of the head's width, to either side of its axis, that has no corners."""
+
+TWO_LEVELS = -0.4
+"""Excess kurtosis below which heights between the corners are on two levels. Noise has 0 or more, heights rounded to
+half of the noise have -0.1, and two passes at a distance of 2 d have -2 (d² / (d² + noise²))²: -0.5 where d is the
+noise."""
+
+APART_M = 0.003
+"""Half the least distance of two levels."""
 
 FLAT_BLUR_M = 0.009
 """Blur from which a head without a round top is not flat to its edges, but shown by passes 20 mm apart or more."""
@@ -68,24 +87,37 @@ FLAT_BLUR_M = 0.009
 ON_HEAD_M = 0.005
 """Distance of a line from its head (RMS) up to which it shows the blur of the head: further off, it was displaced."""
 
-CORE_SIGMAS, SURE_SIGMAS = 4.0, 4.0
-"""Standard deviations from which heights are those of weeds, and of the kurtosis, √(24 / n), from which it is sure."""
+CORE_SIGMAS = 4.0
+"""Standard deviations of the heights above which a point is of weeds."""
 
-CROWNED_SHARE, CROWN_SHARE, CROWN_BAND_M = 0.5, 0.4, 0.006
-"""Curvature of the top, as a share of that of the outline, from which a head is crowned, and the points by which it is
-measured: within this share of the head's width from its axis, and this far from the top. A head that is flat to its
-edges looks 11 mm wider than it is, and blurred, as one that several passes show."""
+SURE_SIGMAS = 4.0
+"""Standard deviations of the kurtosis, √(24 / n), above which it is sure."""
 
-FLAT_RING, FLAT_DROP_M = (0.40, 0.47), 0.0012
-"""Distances from the axis, as shares of the head's width, between which corners are; and by how much less they lie
-below the middle of a head that is flat to its edges. Those of the outline are 2.5 to 5 mm below it."""
+CROWNED_SHARE = 0.5
+"""Curvature of the top of a crowned head, as a share of the curvature of the outline. A head that is flat to its edges
+looks 11 mm wider than it is, and blurred, as a head in several passes does."""
+
+CROWN_SHARE = 0.4
+"""Distance from the axis, as a share of the head's width, within which points give the curvature of the top."""
+
+CROWN_BAND_M = 0.006
+"""Largest height above or below the top of these points."""
+
+FLAT_RING = (0.40, 0.47)
+"""Distances from the axis, as shares of the head's width, between which the corners are."""
+
+FLAT_DROP_M = 0.0012
+"""Largest depth of the corners below the middle of a head that is flat to its edges: the outline has 2.5 to 5 mm."""
 
 SHARP_NOISE_M = 0.003
 """Noise in height from which the outline tells the axis of a head without corners as well as its edges do."""
 
-BEYOND_RING, MAX_BEYOND = (0.53, 0.60), 0.2
-"""Distances from the axis at which a flat head has no points, as shares of its width, and their most density there
-compared with that between the corners and the axis: passes 15 mm apart have half of it there."""
+BEYOND_RING = (0.53, 0.60)
+"""Distances from the axis, as shares of the head's width, between which a flat head has no points."""
+
+MAX_BEYOND = 0.2
+"""Density of the points there, as a share of the density on the head, above which several passes show the head: passes
+15 mm apart have half."""
 
 
 @dataclass(frozen=True)

@@ -196,8 +196,8 @@ def report(figures: SearchFigures, request: Request, progress: Progress) -> None
     if figures.blunt_m:
         progress.warning(
             f"Heads are blunt on {figures.blunt_m:.0f} m of rail: the cloud blurs what it shows by "
-            f"{100 * figures.blur_m:.0f} cm{_as_from_images(request)}, so that a head is a round ridge. Rails are told "
-            "from other ridges by their partner and length, and rails without a partner are left out."
+            f"{100 * figures.blur_m:.0f} cm{_as_from_images(request)}, so that a head is a round ridge. A ridge "
+            "counts as a rail only if it is long and has a partner at the distance of the gauge."
         )
 
 

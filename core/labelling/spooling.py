@@ -63,7 +63,7 @@ def spool_found(
             "the rail points yourself." + (f" For an airborne cloud, use {AIRBORNE}." if request.is_airborne else "")
         )
     report(figures, request, progress)
-    return _gathered(request, side_m, folder, census), figures
+    return _gathered(request, side_m, folder, census, figures), figures
 
 
 def spool_grown(
@@ -97,10 +97,10 @@ def spool_grown(
 
     with writing(folder), scratch_folder(folder) as scratch:
         _, figures = grow_points(request, seeds, settings, scratch, keep, progress)
-    return _gathered(request, side_m, folder, census), figures
+    return _gathered(request, side_m, folder, census, figures), figures
 
 
-def _gathered(request: Request, side_m: float, folder: Path, census: Census) -> SpooledPoints:
+def _gathered(request: Request, side_m: float, folder: Path, census: Census, figures: SearchFigures) -> SpooledPoints:
     """Return the points that were sorted."""
     (source,) = gather(request, side_m, [SpooledFile(str(folder), census.report())])
-    return replace(source, found=True)
+    return replace(source, found=True, blunt=True if figures.blunt_m else None)  # narrow ones may have no edges either

@@ -8,6 +8,7 @@ squares share one raster grid. See docs/method.md section 7.1.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from typing import Protocol
 
@@ -106,6 +107,9 @@ class PointSource(Protocol):
     def near(self, square: Square, margin_m: float) -> RailPoints:
         """Read the points of a square and those at most `margin_m` outside, in the frame of the square."""
 
+    def judged(self, blunt: bool) -> PointSource:
+        """Return the source of points that know whether their cloud blunts heads."""
+
     def part(self, square: Square) -> PointSource:
         """Return the source without the squares that are neither `square` nor its neighbours, where that is smaller."""
 
@@ -130,6 +134,12 @@ class MemorySource:
         xyz = self._points.xyz[chosen] - square.frame.shift_to(self.frame)
         near = replace(self._points.kept(chosen), xyz=xyz, frame=square.frame)
         return near.kept(square.holds(xyz, margin_m))
+
+    def judged(self, blunt: bool) -> MemorySource:
+        """See `PointSource`."""
+        other = copy(self)
+        other._points = replace(self._points, blunt=blunt)
+        return other
 
     def part(self, square: Square) -> MemorySource:
         """See `PointSource`."""

@@ -48,12 +48,15 @@ class SquareRails:
         Places where rails end on each other.
     strips : (k, 7) array
         Offsets of strips at places inside, see `strips.rows_of`.
+    blunt : bool or None
+        Whether the square shows blunt heads; None without lines.
     """
 
     square: Square
     rails: tuple[RailLine, ...]
     nodes: np.ndarray
     strips: np.ndarray = field(default_factory=NO_STRIPS.copy)
+    blunt: bool | None = None
 
 
 def trim(rails: Sequence[RailLine], square: Square, strips: np.ndarray = NO_STRIPS) -> SquareRails:

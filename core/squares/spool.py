@@ -62,7 +62,7 @@ class SpooledPoints:
         Files that hold the points of each square, one for each mark (see `passes.marks_of`), with which its name ends.
     passes : mapping of int to int
         Number of the strip, a pass of the scanner, of each mark.
-    found : bool
+    found, blunt
         See `RailPoints`.
     """
 
@@ -74,6 +74,7 @@ class SpooledPoints:
     files: Mapping[Key, tuple[str, ...]]
     passes: Mapping[int, int]
     found: bool = False
+    blunt: bool | None = None
 
     def near(self, square: Square, margin_m: float) -> RailPoints:
         """See `PointSource`."""
@@ -83,7 +84,11 @@ class SpooledPoints:
         xyz = parts[0] if len(parts) == 1 else np.concatenate(parts or [np.empty((0, 3))])
         strips = np.array([self.passes[_numbers(file)[-1]] for file in files], dtype=np.int32)
         each = np.repeat(strips, [len(part) for part in parts]) if len(np.unique(strips)) > 1 else None
-        return heads_of(RailPoints(xyz, square.frame, self.class_code, each, self.found))
+        return heads_of(RailPoints(xyz, square.frame, self.class_code, each, self.found, self.blunt))
+
+    def judged(self, blunt: bool) -> SpooledPoints:
+        """See `PointSource`."""
+        return replace(self, blunt=blunt)
 
     def part(self, square: Square) -> SpooledPoints:
         """Keep only a square and its neighbours, so that less is sent to a worker."""

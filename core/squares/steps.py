@@ -17,7 +17,7 @@ from ..frpdf.engine import Engine, make_engine
 from ..frpdf.models import choose
 from ..frpdf.weights import load_arrays
 from ..heads.elevation import ElevationParameters, elevate, flat_rail, flat_rails, numbered
-from ..heads.head_points import near_lines
+from ..heads.head_points import judged, near_lines
 from ..heads.refinement import refine
 from ..heads.roads import onto_heads
 from ..heads.strips import measure_strips, rows_of
@@ -121,8 +121,8 @@ def rails_of_square(
     if not square.is_whole_plane:
         # A line may be longer than the part of it that the square shows; `whole_rails` drops the lines that are short.
         parameters = replace(parameters, min_length_m=min(parameters.min_length_m, overlap_m - HALO_M))
-    rails, strips = _all_vertices(raster, source.class_code, points, parameters, progress)
-    return trim(rails, square, strips)
+    rails, strips, blunt = _all_vertices(raster, source.class_code, points, parameters, progress)
+    return replace(trim(rails, square, strips), blunt=blunt)
 
 
 def whole_rails(
@@ -170,20 +170,23 @@ def lines_of(
     first_id : int
         `rail_id` of the first rail.
     """
-    drawn, _ = _all_vertices(raster, class_code, points, parameters, progress)
+    drawn, _, _ = _all_vertices(raster, class_code, points, parameters, progress)
     return _numbered(drawn, parameters, first_id, progress)
 
 
 def _all_vertices(
     raster: RailRaster, class_code: int, points: RailPoints | None, parameters: Parameters, progress: Progress
-) -> tuple[tuple[RailLine, ...], np.ndarray]:
-    """Turn the cleaned raster of one class into rails that have all their vertices, and list the offsets of strips.
+) -> tuple[tuple[RailLine, ...], np.ndarray, bool | None]:
+    """Turn the cleaned raster of one class into rails that have all their vertices.
 
-    See `strips.rows_of`.
+    Also returns the offsets of strips, see `strips.rows_of`, and whether heads are blunt, see `RailPoints`.
     """
     drawing, measuring = progress.divide((VECTORIZE + SMOOTH, REFINE + ELEVATE))
     network = draw_lines(raster, parameters, drawing)
-    return measure_lines(network, points, class_code, parameters, raster.cell_m, measuring)
+    if points is not None:
+        points = judged(points, network.lines, parameters.head_width_m)
+    rails, strips = measure_lines(network, points, class_code, parameters, raster.cell_m, measuring)
+    return rails, strips, None if points is None else points.blunt
 
 
 def draw_lines(raster: RailRaster, parameters: Parameters, progress: Progress = SILENT) -> LineNetwork:
@@ -236,9 +239,9 @@ def measure_lines(
     drawn = [flat_rail(line, class_code) for line in network.lines]
     heads = widths_by_gauge(drawn, parameters.gauges, parameters.centerline_tolerance_m)
     spacings_m = [sum(gauge) for gauge in parameters.gauges]
-    network = replace(network, lines=onto_heads(network.lines, points.xyz, heads, spacings_m))
+    network = replace(network, lines=onto_heads(network.lines, points, heads, spacings_m))
     network = refine(network, points, heads, parameters.smoothing_xy_m, refining, elevation.align, cell_m)
-    near = near_lines(network.lines, points.xyz, heads, points.strips, elevating.span(0.0, 0.6))
+    near = near_lines(network.lines, points.xyz, heads, points.strips, elevating.span(0.0, 0.6), points.blunt)
     strips = [measure_strips(head) for head in near]
     rails = elevate(network, near, class_code, elevation, elevating.span(0.6, 1.0), strips)
     return rails, rows_of(network.lines, strips)

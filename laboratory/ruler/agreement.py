@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...core.comparison.pieces import Pieces, cut, nearest
+from ...core.comparison.pieces import cut
+from ...core.polyline import Chords
 from ...core.rails import RailLine
 
 SAME_RAIL_M = 0.30
@@ -54,9 +55,9 @@ HEADER = f"{'m':>8}{'across mm':>16}{'height mm':>16}{'/ sigma':>8}{'height':>8}
 def agreement(first: Sequence[RailLine], second: Sequence[RailLine]) -> Agreement | None:
     """Compare the rails of two surveys in the same coordinates, with standard errors; None if they share none."""
     there, here = (cut([rail.xyz for rail in rails]) for rails in (first, second))
-    if not len(there.start) or not len(here.start):
+    if not len(there.xyz) or not len(here.xyz):
         return None
-    feet, number = nearest(here.middle, there)
+    feet, number = there.nearest(here.middle)
     step = here.middle - feet
     mine = np.flatnonzero(np.hypot(step[:, 0], step[:, 1]) <= SAME_RAIL_M)
     if not len(mine):
@@ -66,10 +67,10 @@ def agreement(first: Sequence[RailLine], second: Sequence[RailLine]) -> Agreemen
     return Agreement(here.lengths[mine], across[mine], step[mine, 2], *sigma_m)
 
 
-def _sigmas(rails: Sequence[RailLine], pieces: Pieces, chosen: np.ndarray) -> np.ndarray:
-    """Stated standard errors across and in height at some pieces, (2, k) metres."""
+def _sigmas(rails: Sequence[RailLine], chords: Chords, chosen: np.ndarray) -> np.ndarray:
+    """Stated standard errors across and in height at some chords, (2, k) metres."""
     found = np.empty((2, len(chosen)))
-    number, t = pieces.number[chosen], pieces.t[chosen]
+    number, t = chords.number[chosen], chords.middle_t[chosen]
     for rail in np.unique(number):
         support = rails[rail].support
         if support is None:

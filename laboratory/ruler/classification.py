@@ -11,7 +11,7 @@ import numpy as np
 
 from ...core.classify.settings import Settings
 from ...core.clouds.points import RailPoints
-from ...core.comparison.pieces import cut, nearest
+from ...core.comparison.pieces import cut
 from ...core.parameters import Parameters
 from ...core.pipeline import extract_rails
 from ...core.rails import RailNetwork, SearchFigures
@@ -136,7 +136,7 @@ def truth(scene: RawScene, rail: np.ndarray, wide: bool) -> tuple[np.ndarray, np
     if not scene.rails:
         return head, beside
     chosen = np.flatnonzero(scene.head | rail)
-    feet, _ = nearest(scene.xyz[chosen], cut(scene.shown))
+    feet, _ = cut(scene.shown).nearest(scene.xyz[chosen])
     across = np.linalg.norm((scene.xyz[chosen] - feet)[:, :2], axis=1)
     above = scene.xyz[chosen, 2] - feet[:, 2]
     blunted = scene.crests is not None

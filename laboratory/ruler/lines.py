@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from ...core.comparison.pieces import cut, nearest
+from ...core.comparison.pieces import cut
 
 
 @dataclass(frozen=True)
@@ -75,8 +75,11 @@ class Offsets:
 
     def within(self, tolerance_m: float) -> Offsets:
         """Return the offsets at places where the line is near the truth."""
-        near = self.distance <= tolerance_m
-        return Offsets(self.distance[near], self.lateral[near], self.height[near], self.weight[near])
+        return self.at(self.distance <= tolerance_m)
+
+    def at(self, which: np.ndarray) -> Offsets:
+        """Return the offsets at some of the places, (n,) bool."""
+        return Offsets(self.distance[which], self.lateral[which], self.height[which], self.weight[which])
 
 
 @dataclass(frozen=True)
@@ -92,6 +95,8 @@ class Match:
     t : (n,) array
         Plan distance of each place of `back` from the start of its line, metres.
     line_count, truth_count : int
+    true : (n,) int array
+        Place of `there` that is nearest to each place of `back`; empty without lines or truth.
     """
 
     there: Offsets
@@ -100,6 +105,12 @@ class Match:
     t: np.ndarray
     line_count: int
     truth_count: int
+    true: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=int))
+
+    def where(self, there: np.ndarray, back: np.ndarray) -> Match:
+        """Return what some places of the truth, and some places of the lines, show; (n,) bool each."""
+        line, t = self.line[back], self.t[back]
+        return Match(self.there.at(there), self.back.at(back), line, t, self.line_count, self.truth_count)
 
     def within(self, tolerance_m: float) -> Comparison:
         """Compare lines and truth that are at most this distance apart in plan."""
@@ -159,16 +170,16 @@ def match(extracted: Sequence[np.ndarray], truth: Sequence[np.ndarray]) -> Match
     if not len(true.start):
         nothing = np.full(len(lines.start), np.inf)
         back = Offsets(nothing, nothing, nothing, lines.lengths)
-        return Match(back.within(0.0), back, lines.number, lines.t, len(extracted), 0)
+        return Match(back.within(0.0), back, lines.number, lines.middle_t, len(extracted), 0)
     if not len(lines.start):
         nothing = np.full(len(true.start), np.inf)
         there = Offsets(nothing, nothing, nothing, true.lengths)
-        return Match(there, there.within(0.0), lines.number, lines.t, len(extracted), len(truth))
-    feet, _ = nearest(true.middle, lines)
+        return Match(there, there.within(0.0), lines.number, lines.middle_t, len(extracted), len(truth))
+    feet, _ = lines.nearest(true.middle)
     there = Offsets.between(true.middle, feet, true.left, true.lengths)
-    feet, piece = nearest(lines.middle, true)
-    back = Offsets.between(feet, lines.middle, true.left[piece], lines.lengths)
-    return Match(there, back, lines.number, lines.t, len(extracted), len(truth))
+    feet, chord = true.nearest(lines.middle)
+    back = Offsets.between(feet, lines.middle, true.left[chord], lines.lengths)
+    return Match(there, back, lines.number, lines.middle_t, len(extracted), len(truth), chord)
 
 
 def _worse(a: float, b: float) -> float:

@@ -41,6 +41,12 @@ class RawScene:
         Rails as a blunted surface shows them, lower than the tops; None where the cloud shows the tops.
     classification : (n,) uint8 array or None
         Classes of a ground filter, of a survey by images.
+    passes : (n,) uint8 array or None
+        Number of the scanner or camera of each point, from 0.
+    strips : (n,) uint16 array or None
+        Source id of each point; None if the file states none.
+    times : (n,) array or None
+        Seconds; None for the times of one pass.
     """
 
     name: str
@@ -53,6 +59,9 @@ class RawScene:
     other_gauges_m: tuple[float, ...] = ()
     crests: tuple[np.ndarray, ...] | None = None
     classification: np.ndarray | None = None
+    passes: np.ndarray | None = None
+    strips: np.ndarray | None = None
+    times: np.ndarray | None = None
 
     @property
     def head(self) -> np.ndarray:
@@ -85,7 +94,9 @@ def scan_world(
     clouds, kinds, classes, crests = [], [], [], None
     for scanner in scanners:
         station = scanner.stations(line.length_m)
-        world = World(line, station, ways_of(line, station, tracks), standard.head_width_m, bedding, rng, half_width_m)
+        shear = 0.0 if isinstance(scanner, Photogrammetry) else scanner.turned
+        ways = ways_of(line, station, tracks, shear)
+        world = World(line, station, ways, standard.head_width_m, bedding, rng, half_width_m, shear=shear)
         for thing in things:
             thing(world)
         if isinstance(scanner, Photogrammetry):
@@ -111,6 +122,7 @@ def scan_world(
         other_gauges_m=other_gauges_m,
         crests=crests,
         classification=None if crests is None else np.concatenate(classes),
+        passes=np.repeat(np.arange(len(kinds), dtype=np.uint8), [len(one) for one in kinds]),
     )
 
 
@@ -120,9 +132,18 @@ def _scanned(world: World, scanner: RawScanner) -> tuple[np.ndarray, np.ndarray]
     source = np.column_stack([np.full(len(top), scanner.left_m), top + scanner.height_m])
     hits = cast(world.segments(), source, scanner, world.rng)
     kept = np.abs(hits.place[:, 0]) < world.half_width_m
+    if scanner.stand_m is not None:
+        ahead_m = world.station[hits.profile] - scanner.stand_m
+        reach_m = np.hypot(*(hits.place - source[hits.profile]).T)
+        kept &= world.rng.random_sample(len(kept)) < scanner.share_kept(ahead_m, reach_m)
     profile, place = hits.profile[kept], hits.place[kept]
     jitter = scanner.profile_step_m * (world.rng.random_sample(len(profile)) - 0.5) if scanner.wide else 0.0
-    return placed(world.reference, world.station[profile] + jitter, place[:, 0], place[:, 1]), hits.kind[kept]
+    station = world.station[profile] + jitter + scanner.turned * place[:, 0]
+    # Beyond the ends of the line, the left or the right end of turned profiles would be laid on them.
+    inside = np.ones(len(station), dtype=bool)
+    if scanner.turned:
+        inside = (station > 0) & (station < world.reference.length_m)
+    return placed(world.reference, station[inside], place[inside, 0], place[inside, 1]), hits.kind[kept][inside]
 
 
 def placed(line: Curve, station: np.ndarray, left: np.ndarray, height: np.ndarray) -> np.ndarray:

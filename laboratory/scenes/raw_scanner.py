@@ -50,6 +50,13 @@ class RawScanner:
         Angles that are scanned, from straight down, positive to the left.
     shift_m : tuple of float
         Error of registration: to the left, and up.
+    swing : float
+        Share by which the distance of profiles swings with the carrier's speed.
+    turned : float
+        Tangent of the angle by which the profiles are turned from perpendicular, positive if their left end is ahead.
+    stand_m : float or None
+        Place along the line of a scanner on a tripod, which turns there: rays are `ray_step_rad` apart in both
+        directions, and of the profiles those points are kept that such rays would hit.
     """
 
     profile_step_m: float = 0.05
@@ -62,12 +69,30 @@ class RawScanner:
     wide: bool = False
     view_rad: tuple[float, float] = (-np.pi, np.pi)
     shift_m: tuple[float, float] = (0.0, 0.0)
+    swing: float = 0.15
+    turned: float = 0.0
+    stand_m: float | None = None
 
     def stations(self, length_m: float) -> np.ndarray:
-        """Places of the profiles along a reference line: the carrier's speed swings by 15 %."""
-        count = int(length_m / self.profile_step_m * 1.2)
-        station = np.cumsum(self.profile_step_m * (1 + 0.15 * np.sin(np.arange(count) * self.profile_step_m / 10)))
+        """Places of the profiles along a reference line."""
+        count = int(length_m / self.profile_step_m * (1.05 + self.swing))
+        swing = 1 + self.swing * np.sin(np.arange(count) * self.profile_step_m / 10)
+        station = np.cumsum(self.profile_step_m * swing)
         return station[station < length_m]
+
+    def share_kept(self, ahead_m: np.ndarray, reach_m: np.ndarray) -> np.ndarray:
+        """Share of points that a scanner on a tripod has of those of dense profiles, (n,).
+
+        On any surface along the line, rays of a sphere are `reach_m`² / distance³ · profile_step / ray_step as dense as
+        those of the profiles: the solid angle falls with the square of the distance, and the cosine with it.
+
+        Parameters
+        ----------
+        ahead_m, reach_m : (n,) array
+            Distance from the tripod along the line, and in the profile.
+        """
+        distance_m = np.hypot(ahead_m, reach_m)
+        return np.minimum(reach_m**2 * self.profile_step_m / (distance_m**3 * self.ray_step_rad), 1.0)
 
 
 @dataclass(frozen=True)

@@ -74,6 +74,9 @@ class Bedding:
     terrain_roughness_m : float
     slab : bool
         Whether the track lies on concrete, without ballast.
+    sleeper_step_m, sleeper_width_m, sleeper_length_m : float
+    heap_m : float
+        What the ballast beyond the sleepers' ends is higher than that between them; negative where it has fallen off.
     """
 
     fill_m: float = 0.02
@@ -81,6 +84,10 @@ class Bedding:
     terrain_m: float = 0.95
     terrain_roughness_m: float = 0.02
     slab: bool = False
+    sleeper_step_m: float = SLEEPER_STEP_M
+    sleeper_width_m: float = SLEEPER_WIDTH_M
+    sleeper_length_m: float = SLEEPER_LENGTH_M
+    heap_m: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -115,6 +122,11 @@ class World:
     head_width_m : float
     bedding : Bedding
     rng : RandomState
+    half_width_m : float
+    crown : float
+        Height of the crown of the heads as a share of that of new ones: wear makes them flat.
+    shear : float
+        How far a profile lies ahead of its station for each metre to the left.
     """
 
     reference: Curve
@@ -124,7 +136,8 @@ class World:
     bedding: Bedding
     rng: np.random.RandomState
     half_width_m: float = 14.0
-    paved: list[tuple[np.ndarray, float]] = field(default_factory=list)
+    crown: float = 1.0
+    shear: float = 0.0
     _parts: list[Segments] = field(default_factory=list)
 
     def add(self, across: np.ndarray, height: np.ndarray, kind: int, where: np.ndarray | None = None) -> None:
@@ -159,6 +172,11 @@ class World:
         """Profiles that cut something repeated, (profiles,) bool."""
         return (self.station - phase_m) % step_m < length_m
 
+    @property
+    def across_m(self) -> np.ndarray:
+        """Places across at which the ground is sampled, (m,)."""
+        return np.arange(-self.half_width_m, self.half_width_m + ACROSS_STEP_M, ACROSS_STEP_M)
+
     def box(
         self,
         left_m: np.ndarray | float,
@@ -177,8 +195,8 @@ class World:
         )
 
 
-def ways_of(reference: Curve, station: np.ndarray, tracks: Sequence[Track]) -> list[Way]:
-    """Cut tracks with the profiles perpendicular to a reference line."""
+def ways_of(reference: Curve, station: np.ndarray, tracks: Sequence[Track], shear: float = 0.0) -> list[Way]:
+    """Cut tracks with the profiles of a reference line; see `World.shear`."""
     ways = []
     for track in tracks:
         axis = track.centerline
@@ -190,8 +208,9 @@ def ways_of(reference: Curve, station: np.ndarray, tracks: Sequence[Track]) -> l
         else:
             sample, at, left = along_and_left(reference, axis[:, :2])
             secant = 1 / np.cos(track.curve.heading - reference.heading[sample])
-            order = np.argsort(at)
-            at, left, axis, cant, secant = at[order], left[order], axis[order], cant[order], secant[order]
+        at = at - shear * left
+        order = np.argsort(at)
+        at, left, axis, cant, secant = at[order], left[order], axis[order], cant[order], secant[order]
         place, top, slope, secant = (
             np.interp(station, at, values, left=np.nan, right=np.nan) for values in (left, axis[:, 2], cant, secant)
         )
@@ -204,12 +223,19 @@ def along_and_left(reference: Curve, xy: np.ndarray) -> tuple[np.ndarray, np.nda
     sample = cKDTree(reference.xy).query(xy)[1]
     step = xy - reference.xy[sample]
     forward = np.column_stack([np.cos(reference.heading), np.sin(reference.heading)])[sample]
-    at = reference.chainage[sample] + np.sum(step * forward, axis=1)
-    return sample, at, np.sum(step * reference.left_normal[sample], axis=1)
+    left = np.sum(step * reference.left_normal[sample], axis=1)
+    # Beside a curve, steps along the line are longer or shorter than at the same place on it.
+    at = reference.chainage[sample] + np.sum(step * forward, axis=1) / (1 - left * reference.curvature[sample])
+    return sample, at, left
 
 
-def outline(head_width_m: float) -> tuple[np.ndarray, np.ndarray]:
+def outline(head_width_m: float, crown: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
     """Outline of a rail from the right end of its foot over the head to the left one; parts that are head.
+
+    Parameters
+    ----------
+    head_width_m, crown : float
+        See `World`.
 
     Returns
     -------
@@ -218,7 +244,7 @@ def outline(head_width_m: float) -> tuple[np.ndarray, np.ndarray]:
     (m - 1,) bool array
     """
     below = _FOOT_AND_WEB[1:] - np.array([0.0, RAIL_HEIGHT_M])
-    right = np.concatenate([below, _crown()]) * (head_width_m / 0.072)
+    right = np.concatenate([below, _crown() * np.array([1.0, crown])]) * (head_width_m / 0.072)
     whole = np.concatenate([right, right[-2::-1] * np.array([-1.0, 1.0])])
     number = np.arange(len(whole) - 1)
     first = len(below) - 1
@@ -242,11 +268,13 @@ def rail(
     top_m: np.ndarray,
     where: np.ndarray | None = None,
     kinds: tuple[int, int] = (HEAD, FOOT),
+    lean: np.ndarray | float = 0.0,
 ) -> None:
-    """Add a whole rail whose top lies at a place in each profile."""
-    shape, head = outline(world.head_width_m)
-    across = np.asarray(left_m)[:, None] + shape[:, 0]
-    height = np.asarray(top_m)[:, None] + shape[:, 1]
+    """Add a whole rail whose top lies at a place in each profile; `lean` turns it about its top, to the left."""
+    shape, head = outline(world.head_width_m, world.crown)
+    turn = np.broadcast_to(lean, len(world.station))[:, None]
+    across = np.asarray(left_m)[:, None] + np.cos(turn) * shape[:, 0] - np.sin(turn) * shape[:, 1]
+    height = np.asarray(top_m)[:, None] + np.sin(turn) * shape[:, 0] + np.cos(turn) * shape[:, 1]
     for kind, chosen in ((kinds[0], head), (kinds[1], ~head)):
         for first, last in runs(chosen):  # of segments: they have one more end
             world.add(across[:, first : last + 2], height[:, first : last + 2], kind, where)
@@ -255,28 +283,36 @@ def rail(
 def running_rails(world: World, hidden: np.ndarray | None = None) -> None:
     """Add the rails of all tracks with their fastenings; where heads overlap, rays hit the outline of both."""
     laid: list[np.ndarray] = []
-    middle = world.every(SLEEPER_STEP_M, 0.12, 0.07)
     for way in world.ways:
         for side in (1, -1):
             left, top = rail_place(way, side)
-            laid.append(left)
             rail(world, left, top, hidden)
-            bottom = top - RAIL_HEIGHT_M * world.head_width_m / 0.072
-            if not world.bedding.slab:
-                for across in (-1, 1):
-                    clear = np.min(
-                        [np.where(np.isnan(one), 9.0, np.abs(left + across * 0.075 - one)) for one in laid[:-1]]
-                        or [np.full(len(left), 9.0)],
-                        axis=0,
-                    )
-                    world.box(
-                        np.where(clear > 0.09, left + across * 0.075, np.nan),
-                        bottom,
-                        0.07,
-                        0.065,
-                        FASTENING,
-                        middle if hidden is None else middle & hidden,
-                    )
+            fasten(world, left, top, laid, hidden)
+            laid.append(left)
+
+
+def fasten(
+    world: World, left_m: np.ndarray, top_m: np.ndarray, laid: Sequence[np.ndarray], where: np.ndarray | None = None
+) -> None:
+    """Fasten a rail to its sleepers, except where the rails that were laid before leave no room."""
+    if world.bedding.slab:
+        return
+    middle = world.every(world.bedding.sleeper_step_m, 0.12, (world.bedding.sleeper_width_m - 0.12) / 2)
+    bottom = top_m - RAIL_HEIGHT_M * world.head_width_m / 0.072
+    for across in (-1, 1):
+        clear = np.min(
+            [np.where(np.isnan(one), 9.0, np.abs(left_m + across * 0.075 - one)) for one in laid]
+            or [np.full(len(left_m), 9.0)],
+            axis=0,
+        )
+        world.box(
+            np.where(clear > 0.09, left_m + across * 0.075, np.nan),
+            bottom,
+            0.07,
+            0.065,
+            FASTENING,
+            middle if where is None else middle & where,
+        )
 
 
 def rail_place(way: Way, side: int, inward_m: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
@@ -288,26 +324,27 @@ def rail_place(way: Way, side: int, inward_m: float = 0.0) -> tuple[np.ndarray, 
 
 def ground(world: World, terrain_m: np.ndarray | None = None, where: np.ndarray | None = None) -> None:
     """Add ballast, sleepers and terrain."""
-    across = np.arange(-world.half_width_m, world.half_width_m + ACROSS_STEP_M, ACROSS_STEP_M)
-    bedding = world.bedding
+    across, bedding = world.across_m, world.bedding
     stones = _stones(world, across)
     height = np.full((len(world.station), len(across)), -np.inf)
     kind = np.full(height.shape, GROUND, dtype=np.uint8)
     reference = world.ways[0].top_m[:, None] if world.ways else np.zeros((len(world.station), 1))
     terrain = reference - bedding.terrain_m if terrain_m is None else terrain_m
     terrain = np.broadcast_to(terrain, height.shape) + bedding.terrain_roughness_m / STONE_HEIGHT_M * stones
-    sleeper = world.every(SLEEPER_STEP_M, SLEEPER_WIDTH_M)[:, None]
+    along = world.station[:, None] + world.shear * across
+    sleeper = along % bedding.sleeper_step_m < bedding.sleeper_width_m
+    half_m = bedding.sleeper_length_m / 2
     below = RAIL_HEIGHT_M * world.head_width_m / 0.072 + PAD_M
     for way in world.ways:
         x = across - way.left_m[:, None]
         plane = way.top_m[:, None] + x * way.slope[:, None] - below
-        beyond = np.maximum(np.abs(x) - SLEEPER_LENGTH_M / 2 - SHOULDER_M, 0.0)
-        bed = plane - bedding.fill_m - SLOPE * beyond
+        beyond = np.maximum(np.abs(x) - half_m - SHOULDER_M, 0.0)
+        bed = plane - bedding.fill_m - SLOPE * beyond + bedding.heap_m * (np.abs(x) > half_m)
         bed = bed + (0.0005 / STONE_HEIGHT_M if bedding.slab else bedding.roughness_m / STONE_HEIGHT_M) * stones
         bed = np.where(np.isnan(bed), -np.inf, bed)
         height = np.maximum(height, bed)
         if not bedding.slab:
-            on = sleeper & (np.abs(x) < SLEEPER_LENGTH_M / 2) & (plane > height)
+            on = sleeper & (np.abs(x) < half_m) & (plane > height)
             height, kind = np.where(on, plane, height), np.where(on, np.uint8(SLEEPER), kind)
     kind = np.where(terrain > height, np.uint8(GROUND), kind)
     height = np.maximum(height, terrain)
@@ -346,15 +383,15 @@ def pavement(
             outer = left + side * (head + gap_m)
             cuts.append((np.minimum(inner, outer), np.maximum(inner, outer), left, top, side))
     count = len(world.station)
-    level = np.mean([cut[3] for cut in cuts], axis=0) + lift_m
     order = np.argsort([np.nanmean(cut[2]) for cut in cuts])
-    edge = np.full(count, -half)
+    edge, level = np.full(count, -half), cuts[order[0]][3] + lift_m
     for number in [*order, None]:
         end = np.full(count, half) if number is None else cuts[number][0]
+        before, level = level, level if number is None else cuts[number][3] + lift_m
         share = np.linspace(0, 1, 240)
         across = edge[:, None] + (end - edge)[:, None] * share
         rough = roughness_m * world.rng.standard_normal(across.shape)
-        world.add(across, level[:, None] + rough, PAVEMENT, where)
+        world.add(across, before[:, None] + (level - before)[:, None] * share + rough, PAVEMENT, where)
         if number is not None:
             low, high, left, top, side = cuts[number]
             inner, wall = left - side * (head + groove_m[0]), left - side * head

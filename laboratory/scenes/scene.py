@@ -48,6 +48,8 @@ class Scene:
         Length of rail without points.
     strips : (n,) array or None
         Strip of each point; None if there is one only.
+    times : (n,) array or None
+        Seconds; None where the file states none.
     """
 
     name: str
@@ -60,6 +62,7 @@ class Scene:
     other_gauges_m: tuple[float, ...] = ()
     gaps_m: float = 0.0
     strips: np.ndarray | None = None
+    times: np.ndarray | None = None
 
     def rail_points(self) -> RailPoints:
         """Return the points that `read_rail_points` would read from the file of the scene."""

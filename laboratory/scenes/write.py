@@ -49,6 +49,8 @@ def write_cloud(scene: Scene, path: Path) -> None:
     cloud.classification = scene.classification
     if scene.strips is not None:
         cloud.point_source_id = scene.strips
+    if scene.times is not None:
+        cloud.gps_time = scene.times
     cloud.write(path)
 
 
@@ -76,7 +78,9 @@ def write_raw(scene: RawScene, path: Path) -> None:
     else:
         cloud.classification = np.ones(len(scene.xyz), dtype=np.uint8)
         cloud.intensity = tone
-        cloud.gps_time = np.arange(len(scene.xyz)) / POINTS_PER_S
+        cloud.gps_time = np.arange(len(scene.xyz)) / POINTS_PER_S if scene.times is None else scene.times
+    if scene.strips is not None:
+        cloud.point_source_id = scene.strips
     cloud.write(path)
 
 

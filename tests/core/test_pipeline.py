@@ -268,6 +268,23 @@ def test_errors_of_blunt_rails_explain_what_their_gauge_scatters(monkeypatch):
     assert np.median(found.geometry[0].sigma_mm) == pytest.approx(track.gaugesd_mm / 2, rel=0.15)
 
 
+def test_a_tile_far_from_the_others_does_not_decide_alone_whether_heads_are_blunt(monkeypatch):
+    """A sharp track, and 20 m of ridges in another square."""
+    monkeypatch.setattr(steps, "clean", lambda raster, *_: raster)
+    rng, half = np.random.RandomState(8), 0.5 * (1.435 + WIDTH)
+    few = ridges(rng, half, -half)
+    few = few[few[:, 0] < 20]
+    t, side = rng.uniform(0, 100, 40_000), rng.choice([half, -half], 40_000)
+    sharp = np.column_stack([t, side + rng.uniform(-WIDTH / 2, WIDTH / 2, len(t)), rng.normal(0, 0.002, len(t))])
+    points = RailPoints(np.concatenate([sharp, few + [900.0, 0.0, 0.0]]), LocalFrame(np.zeros(3)), 10)
+    parameters = Parameters(1.435, WIDTH, quality_step_m=1.0)
+    itself, told, other = (extract_rails([replace(points, blunt=blunt)], parameters) for blunt in (None, False, True))
+    assert not itself.heads.blunt and other.heads.blunt
+    for one, same, different in zip(itself.rails, told.rails, other.rails):
+        np.testing.assert_array_equal(one.xyz, same.xyz)
+        assert one.sigma_mm == same.sigma_mm != different.sigma_mm
+
+
 def _by_length(lines):
     return sorted(lines, key=lambda line: line.length_m)
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from rail_extract.core.airborne.axis import Points, axis_of_guide
+from rail_extract.core.airborne.axis import axis_of_guide
 
 
 def arc(radius_m, step_m, length_m=400.0):
@@ -26,6 +26,6 @@ def test_points_find_their_feet_on_a_moved_line(shift, turn, left, along):
     axis = axis_of_guide(guide @ spin + shift)
     place = np.array([[along, left]]) @ spin + shift
     rough = np.clip(np.array([along]) + 0.04 * shift, 0, 199)
-    t, across = axis.feet(Points(np.column_stack([place, [0.0]]), np.zeros(1, int), rough))
+    t, across = axis.feet_near(place, rough)
     assert t[0] == pytest.approx(along, abs=1e-6)
     assert across[0] == pytest.approx(left, abs=1e-6)

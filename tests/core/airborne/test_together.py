@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from rail_extract.core.airborne.axis import Axis
 from rail_extract.core.airborne.ridges import Fit
 from rail_extract.core.airborne.sections import Sections
 from rail_extract.core.airborne.together import draw_together
+from rail_extract.core.polyline import Polyline
 
 LENGTH_M, RADIUS_M, APART_M, NOISE_M = 400.0, 450.0, 4.0, 0.06
 
@@ -14,7 +14,7 @@ def arc(left_m, backwards=False):
     t = np.arange(0.0, LENGTH_M)
     radius = RADIUS_M - left_m
     xy = radius * np.column_stack([np.sin(t / RADIUS_M), -np.cos(t / RADIUS_M)])
-    return Axis(xy[::-1] if backwards else xy, t)
+    return Polyline(xy[::-1] if backwards else xy, t)
 
 
 def sections(seed, hidden=(), noise_m=NOISE_M):
@@ -27,8 +27,8 @@ def sections(seed, hidden=(), noise_m=NOISE_M):
 
 
 def errors(line, found, curve):
-    place, normal = line.at(found.stations_on(line))
-    return ((curve.xy - place) * normal).sum(axis=1)
+    t = found.stations_on(line)
+    return ((curve.xy - line.at(t)) * line.left_at(t)).sum(axis=1)
 
 
 def rms(values):
@@ -61,7 +61,7 @@ def test_a_hidden_part_follows_the_other_track():
 def test_tracks_that_part_do_not_pull_each_other():
     t = np.arange(0.0, LENGTH_M)
     leaving = np.maximum(t - 150, 0) ** 2 / (2 * 300.0)
-    lines = [Axis(np.column_stack([t, 0 * t]), t), Axis(np.column_stack([t, APART_M + leaving]), t)]
+    lines = [Polyline(np.column_stack([t, 0 * t]), t), Polyline(np.column_stack([t, APART_M + leaving]), t)]
     found = [sections(1, (), 0.01), sections(2, (), 0.01)]
     for line, one, curve in zip(lines, found, draw_together(lines, found)):
         assert np.abs(errors(line, one, curve)).max() < 0.04

@@ -52,9 +52,12 @@ def test_feet_move_steadily_along_bends(turns_deg, left_m):
     share = np.linspace(0.02, 0.98, 400) * (len(xy) - 1)
     inner = share.astype(int)
     base = xy[inner] + (share - inner)[:, None] * np.diff(xy, axis=0)[inner]
-    normals = axis.normals[inner] * (1 - share + inner)[:, None] + axis.normals[inner + 1] * (share - inner)[:, None]
+    normals = (
+        axis.line.normals[inner] * (1 - share + inner)[:, None]
+        + axis.line.normals[inner + 1] * (share - inner)[:, None]
+    )
     feet = axis.feet(base + 0.5 * left_m * normals)
-    expected = axis.along[inner] + (share - inner) * 40
+    expected = axis.line.t[inner] + (share - inner) * 40
     np.testing.assert_allclose(feet.s, expected, atol=1e-5)
 
 

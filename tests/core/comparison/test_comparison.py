@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from rail_extract.core.comparison.pieces import cut, nearest, spacing_and_cant
+from rail_extract.core.comparison.pieces import cut, spacing_and_cant
 from rail_extract.core.comparison.shift import find_shift
 from rail_extract.core.comparison.tracks import Survey, SurveyedLine, compare_surveys
 from rail_extract.core.errors import Cancelled
@@ -164,7 +164,7 @@ def test_nothing_in_common():
 
 def test_nearest_places_and_cross_sections():
     lines = cut([np.array([[0.0, 0, 1], [10, 0, 1]]), np.array([[0.0, 1.5, 1.02], [10, 1.5, 1.02]])])
-    feet, number = nearest(np.array([[3.0, 0.2, 0.0]]), lines)
+    feet, number = lines.nearest(np.array([[3.0, 0.2, 0.0]]))
     np.testing.assert_allclose(feet, [[3.0, 0.0, 1.0]], atol=1e-9)
     assert lines.number[number].tolist() == [0]
     found = spacing_and_cant(np.array([[3.0, 1.45], [3.0, 2.0]]), np.array([[3.0, 0.0], [3.0, 0.0]]), lines)

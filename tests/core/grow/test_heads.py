@@ -8,7 +8,7 @@ from rail_extract.core.grow.growth import grow
 from rail_extract.core.grow.heads import heads_in
 from rail_extract.core.grow.settings import DENSE, THIN, GrowSettings
 from rail_extract.core.polyline import length_along
-from rail_extract.laboratory.ruler.lines import cut, nearest
+from rail_extract.laboratory.ruler.lines import cut
 from rail_extract.laboratory.ruler.whole_clouds import GrowingCloud
 from rail_extract.laboratory.scenes.raw_catalogue import RAW_SCENES
 from rail_extract.laboratory.scenes.raw_strips import GAUGE_M, WIDTH_M
@@ -38,7 +38,7 @@ def near(scene):
 
 
 def distances(xyz, rails):
-    return np.hypot(*(xyz - nearest(xyz, cut(rails))[0]).T[:2])
+    return np.hypot(*(xyz - cut(rails).nearest(xyz)[0]).T[:2])
 
 
 @pytest.mark.parametrize(("beam", "width", "apart"), [(DENSE, WIDTH_M, 0.12), (THIN, 0.11, 0.25)])

@@ -31,7 +31,7 @@ def drawn(*y):
 
 
 def moved(points, *y):
-    return [line[:, 1] for line in onto_heads(drawn(*y), points.xyz, np.full(len(y), WIDTH), [SPACING])]
+    return [line[:, 1] for line in onto_heads(drawn(*y), points, np.full(len(y), WIDTH), [SPACING])]
 
 
 @pytest.mark.parametrize("road_m", [0.03, 0.06, 0.08])
@@ -52,7 +52,7 @@ def test_road_next_to_one_rail_is_told_by_the_other():
 def test_a_band_without_a_partner_stays_and_its_error_is_half_of_the_road():
     points = street(0.07)
     points = points.kept(points.xyz[:, 1] > 0)
-    lines = onto_heads(drawn(0.5 * (SPACING + 0.07)), points.xyz, np.array([WIDTH]), [SPACING])
+    lines = onto_heads(drawn(0.5 * (SPACING + 0.07)), points, np.array([WIDTH]), [SPACING])
     assert np.allclose(lines[0][:, 1], 0.5 * (SPACING + 0.07))
     network = LineNetwork(tuple(lines), lines[0][[0, -1]], np.array([[0, 1]]))
     (rail,) = elevate(network, near_lines(lines, points.xyz, WIDTH), 10)

@@ -1,0 +1,143 @@
+"""Raw worlds classified as imperfectly as people and their programs classify clouds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ...core.polyline import resample
+from ..scenes.raw import RawScene
+from ..scenes.raw_scanner import MIXED
+from ..scenes.raw_world import FASTENING, FOOT, GROUND, GUARD, HEAD, PLANT, SLEEPER
+from ..scenes.scene import GROUND as GROUND_CLASS
+from ..scenes.scene import RAIL, UNCLASSIFIED, Scene
+from ..scenes.whole_rails import ABOVE_M, BELOW_M, BESIDE_M, STEP_M
+from .draws import chosen, even_in_log, maybe, stream
+
+HEADS, FACES, WHOLE = "heads", "heads and faces", "whole rails"
+STYLES = {HEADS: 0.2, FACES: 0.3, WHOLE: 0.5}
+"""What the class holds, and the shares of it."""
+
+CROWN_M = 0.012
+"""Depth below the top to which a head is its crown and its upper corners."""
+
+LEAK_M = 0.25
+"""Distance from a rail within which other points come into its class."""
+
+GAP_M = (0.3, 4.0)
+"""Lengths of sections of a rail that were not classified."""
+
+
+@dataclass(frozen=True)
+class Classification:
+    """How a world is classified.
+
+    Attributes
+    ----------
+    style : str
+        One of `STYLES`.
+    faces, feet : float
+        Shares of the points on faces, and on webs and feet, that are classified as rail.
+    feet_from, feet_to : float
+        Part of the length of each rail, 0 to 1, in which webs and feet are.
+    mixed, guards : bool
+        Whether points between two surfaces, and guard rails, are classified as rail.
+    leaks, weeds : float
+        Shares of the points of the bed and of plants beside rails that are.
+    missed : float
+        Share of the points on rails that are not.
+    gaps : int
+        Sections of each rail without points, at most.
+    """
+
+    style: str
+    faces: float
+    feet: float
+    feet_from: float
+    feet_to: float
+    mixed: bool
+    guards: bool
+    leaks: float
+    weeds: float
+    missed: float
+    gaps: int
+
+
+def draw_classification(seed: int) -> Classification:
+    """Draw how a world is classified."""
+    rng = stream(seed, "classification")
+    style = chosen(rng, STYLES)
+    faces = 0.0 if style == HEADS else (rng.uniform(0.1, 1.0) if style == FACES else 1.0)
+    feet = 0.0 if style != WHOLE else (1.0 if maybe(rng, 0.5) else even_in_log(rng, 0.03, 1.0))
+    start, end = np.sort(rng.random_sample(2)) if maybe(rng, 0.25) else (0.0, 1.0)
+    return Classification(
+        style=style,
+        faces=float(faces),
+        feet=float(feet),
+        feet_from=float(start),
+        feet_to=float(end),
+        mixed=style == WHOLE or maybe(rng, 0.3),
+        guards=maybe(rng, 0.8),
+        leaks=even_in_log(rng, 0.0005, 0.03) if maybe(rng, 0.5) else 0.0,
+        weeds=rng.uniform(0.0, 0.5) if maybe(rng, 0.4) else 0.0,
+        missed=rng.uniform(0.0, 0.4) if maybe(rng, 0.4) else 0.0,
+        gaps=int(chosen(rng, {0: 50, 1: 20, 2: 20, 3: 10})),
+    )
+
+
+def classified(scene: RawScene, how: Classification, seed: int) -> Scene:
+    """Classify a raw world; of a survey by images, other classes are those of its ground filter."""
+    rng = stream(seed, "labels")
+    chance = rng.random_sample(len(scene.kind))
+    places, share, gap = _along(scene, how, rng)
+    distance_m, place = cKDTree(places[:, :2]).query(scene.xyz[:, :2], distance_upper_bound=1.0)
+    near = np.isfinite(distance_m)
+    place = np.where(near, place, 0)
+    above_m = scene.xyz[:, 2] - places[place, 2]
+    kind, crown = scene.kind, above_m > -CROWN_M
+    if scene.crests is not None:
+        # On a surface, nothing but the uppermost is seen, and a head is as high as it is drawn.
+        crown = np.ones(len(kind), dtype=bool)
+    rail = (kind == HEAD) & (crown | (chance < how.faces))
+    inside = (share[place] >= how.feet_from) & (share[place] <= how.feet_to)
+    rail |= (kind == FOOT) & inside & (chance < how.feet)
+    rail |= (kind == GUARD) & how.guards & (above_m > -BELOW_M)
+    rail |= (kind == MIXED) & how.mixed & (above_m < ABOVE_M) & (above_m > -BELOW_M) & (distance_m < BESIDE_M)
+    rail &= rng.random_sample(len(kind)) >= how.missed
+    rail &= ~(gap[place] & near & (distance_m < LEAK_M))
+    rail |= np.isin(kind, (GROUND, SLEEPER, FASTENING)) & (distance_m < LEAK_M) & (chance < how.leaks)
+    rail |= (kind == PLANT) & (distance_m < 2 * LEAK_M) & (chance < how.weeds)
+    other = scene.classification
+    if other is None:
+        other = np.where(np.isin(kind, (GROUND, SLEEPER)), GROUND_CLASS, UNCLASSIFIED)
+    return Scene(
+        scene.name,
+        scene.xyz,
+        np.where(rail, RAIL, other).astype(np.uint8),
+        scene.shown,
+        scene.centerlines,
+        scene.standard,
+        scene.frame,
+        scene.other_gauges_m,
+        strips=scene.strips,
+        times=scene.times,
+    )
+
+
+def _along(
+    scene: RawScene, how: Classification, rng: np.random.RandomState
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Places on the rails, (m, 3), their part of the length of the rail, and whether they are not classified, (m,)."""
+    places, shares, gaps = [], [], []
+    for rail in scene.rails:
+        place, at = resample(rail, STEP_M)
+        hidden = np.zeros(len(place), dtype=bool)
+        for _ in range(rng.randint(how.gaps + 1)):
+            start = rng.uniform(0.0, at[-1])
+            hidden |= (at > start) & (at < start + rng.uniform(*GAP_M))
+        places.append(place)
+        shares.append(at / at[-1])
+        gaps.append(hidden)
+    return np.concatenate(places), np.concatenate(shares), np.concatenate(gaps)

@@ -1,0 +1,59 @@
+"""Worlds: a seed gives the same world, and the truth is where the scanner saw the heads."""
+
+import numpy as np
+import pytest
+from rail_extract.core.comparison.pieces import cut
+from rail_extract.laboratory.scenes.raw_world import HEAD
+from rail_extract.laboratory.worlds.railway import draw_railway
+from rail_extract.laboratory.worlds.world import make
+
+SMALL = (1, 6, 11)
+"""A drone over a double track, one narrow-gauge track in a curve, and a crossover."""
+
+
+@pytest.fixture(scope="module", params=SMALL)
+def world(request):
+    return make(request.param, "classified")
+
+
+def test_a_world_is_a_function_of_its_seed(world):
+    again = make(world.seed, "classified")
+    assert np.array_equal(again.scene.xyz, world.scene.xyz)
+    assert np.array_equal(again.classified.classification, world.classified.classification)
+    assert again.describe() == world.describe()
+
+
+def test_points_on_heads_are_around_the_truth(world):
+    on_head = world.scene.xyz[world.scene.kind == HEAD]
+    feet, _ = cut(world.scene.rails).nearest(on_head)
+    off = on_head - feet
+    noise_m = 0.02 if world.survey.from_above else 0.008
+    across = np.hypot(off[:, 0], off[:, 1])
+    assert np.percentile(across, 99) < world.scene.standard.head_width_m / 2 + noise_m
+    assert np.percentile(off[:, 2], 99) < 2 * noise_m
+    assert np.median(off[:, 2]) > -0.03
+
+
+def test_many_worlds_differ_in_what_counts():
+    railways = [draw_railway(seed) for seed in range(1, 61)]
+    assert len({one.standard.name for one in railways}) > 20
+    assert {one.family for one in railways} == {"main line", "yard", "narrow gauge", "tram", "metro"}
+    assert max(len(one.tracks) for one in railways) >= 6
+    assert sum(not one.plain for one in railways) > 15
+    sharpest = [np.abs(one.reference.curvature).max() for one in railways]
+    assert max(sharpest) > 1 / 60
+    assert sum(one == 0 for one in sharpest) > 10
+
+
+def test_tracks_that_meet_have_rails_at_one_height():
+    for seed in range(1, 200):
+        railway = draw_railway(seed)
+        if railway.plain:
+            continue
+        rails = [rail for track in railway.tracks for rail in track.rails()]
+        for number, rail in enumerate(rails):
+            others = cut([*rails[:number], *rails[number + 1 :]])
+            feet, _ = others.nearest(rail)
+            off = rail - feet
+            meeting = np.hypot(off[:, 0], off[:, 1]) < 0.002
+            assert np.all(np.abs(off[meeting, 2]) < 0.003), seed
