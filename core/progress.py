@@ -218,3 +218,21 @@ def counted(count: int, one: str, many: str = "") -> str:
 
 
 SILENT = Progress()
+
+
+class Until(_Relay):
+    """Cancels after a time.
+
+    Parameters
+    ----------
+    listener : Progress
+    limit_s : float
+    """
+
+    def __init__(self, listener: Progress, limit_s: float) -> None:
+        super().__init__(listener)
+        self._end = time.monotonic() + limit_s
+
+    def is_cancelled(self) -> bool:
+        """Return whether the time is over, or the user has cancelled the run."""
+        return super().is_cancelled() or time.monotonic() > self._end

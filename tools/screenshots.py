@@ -47,11 +47,11 @@ from qgis.PyQt.QtCore import QSize  # noqa: E402
 from qgis.PyQt.QtGui import QColor  # noqa: E402
 from qgis.PyQt.QtWidgets import QMainWindow, QWidget  # noqa: E402
 from rail_extract.core.frame import LocalFrame  # noqa: E402
+from rail_extract.core.jobs.clouds import CloudSource  # noqa: E402
 from rail_extract.core.standards import RAIL_CLASS, resolve  # noqa: E402
 from rail_extract.laboratory.scenes.raw_catalogue import turnout  # noqa: E402
 from rail_extract.laboratory.scenes.scene import Scene  # noqa: E402
 from rail_extract.laboratory.scenes.write import write_cloud  # noqa: E402
-from rail_extract.rail_extract_plugin.reading.clouds import CloudSource  # noqa: E402
 from rail_extract.rail_extract_plugin.writing.run import properties_of  # noqa: E402
 
 ROOT = Path(__file__).resolve().parents[1]

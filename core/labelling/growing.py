@@ -21,7 +21,7 @@ from ..grow.growth import Growth, Stop
 from ..grow.heads import OnHeads
 from ..grow.seeds import Growths
 from ..grow.settings import GrowSettings
-from ..polyline import length_along, resample
+from ..polyline import Polyline
 from ..progress import SILENT, Progress
 from ..rails import SearchFigures
 from ..raster import BORDER_CELLS, cell_size
@@ -124,7 +124,7 @@ def grow_all(
     """
     reading, growing = progress.divide((1.0, 1.0))
     local = [request.zero.to_local(np.column_stack([seed[:, :2], np.zeros(len(seed))]))[:, :2] for seed in seeds]
-    places = [resample(seed, LINE_STEP_M)[0] if len(seed) > 1 else seed for seed in local]
+    places = [Polyline(seed).resampled(LINE_STEP_M).xyz if len(seed) > 1 else seed for seed in local]
     places = _in_cloud(request, places)
     request.announce(progress)
     cloud = Cloud(request, np.concatenate(places), settings, folder, reading)
@@ -213,7 +213,7 @@ def _lengths(growths: Sequence[Growth]) -> SearchFigures:
     known[pairs[owner[pairs[:, 0]] != owner[pairs[:, 1]], 1]] = True
     lengths_m = {True: 0.0, False: 0.0}
     for number, (rail, is_paired) in enumerate(rails):
-        own_m = np.gradient(length_along(rail.xyz[:, :2])) * ~known[owner == number] * rail.seen
+        own_m = np.gradient(Polyline(rail.xyz).t) * ~known[owner == number] * rail.seen
         lengths_m[is_paired] += float(own_m.sum())
     return SearchFigures(paired_m=lengths_m[True], single_m=lengths_m[False])
 

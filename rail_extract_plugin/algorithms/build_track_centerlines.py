@@ -5,15 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from ...core.jobs.build_track_centerlines import JOB
+from ...core.jobs.shared import figures_of
 from ...core.progress import Progress
 from ...core.standards import Gauge, RailStandard
-from ..dialog import inputs, outputs
-from ..dialog import parameters as groups
-from ..dialog.definitions import Definitions
 from ..dialog.parameter_values import ParameterValues
-from ..writing.layers import figures_of, write_layer
-from .base import RAIL_WORDS, TRACK_WORDS, RailAlgorithm
-from .toolbox_groups import STEPS
+from ..writing.layers import write_layer
+from .base import RailAlgorithm
 
 READING = 0.1
 """Fraction of the progress bar for reading the lines."""
@@ -30,37 +28,7 @@ class Job:
 class BuildTrackCenterlines(RailAlgorithm):
     """The algorithm ``railextract:buildtrackcenterlines``."""
 
-    NAME = "buildtrackcenterlines"
-    LABEL = "Build track centerlines"
-    GROUP = STEPS
-    TAGS = (*RAIL_WORDS, *TRACK_WORDS, "centerline", "centreline", "axis")
-    NEEDS = (("numpy",), ("scipy",), ("pyproj",))
-    SUMMARY = "Pairs rails that are one gauge apart and draws the line midway between the two rails of each track."
-    PICTURE = "gauge.svg"
-    HELP = (
-        "Takes the lines of Vectorize Rails, or rails drawn by hand: lines in any direction, also curved and "
-        "multi-part ones. The fields rail_id and class_code are used if they exist. Both rails of a track have the "
-        "same class.\n\n"
-        "For mixed and dual gauge, fill in Other gauges: on track with three rails, the common rail belongs to both "
-        "tracks. Lines without heights give centerlines without heights.\n\n"
-        "RAILS, if asked for, has the rails again, with the tracks of each in track_ids. Lone lines that are too high "
-        "or too low for a rail, compared with the tracks alongside, are left out of it."
-    )
-
-    def definitions(self) -> Definitions:
-        """Return the parameters and outputs in the order of the interface."""
-        return (
-            inputs.rails(),
-            *groups.rail(),
-            *groups.pairing(),
-            groups.max_gap(),
-            groups.smoothing_xy(),
-            *groups.simplification(),
-            groups.min_length(),
-            outputs.centerlines(),
-            outputs.on_demand(outputs.rails("RAILS", optional=True)),
-            *outputs.centerline_figures(),
-        )
+    JOB = JOB
 
     def read(self, values: ParameterValues) -> Job:
         """Read and check the parameters, in the main thread."""

@@ -7,20 +7,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ...core.fields import QUALITY_FIELDS
+from ...core.jobs.clouds import CloudSource
+from ...core.jobs.measure_track_geometry import JOB
 from ...core.parameters import Parameters
 from ...core.progress import Progress, Recording
 from ...core.standards import CUSTOM, Gauge, RailStandard, resolve
-from ..dialog import inputs, outputs
-from ..dialog import parameters as groups
-from ..dialog.definitions import Definitions
 from ..dialog.parameter_values import ParameterValues
-from ..reading.clouds import CloudSource, points_folder
+from ..reading.clouds import points_folder
 from ..writing.layers import figures_of_stations, layer_writers
 from ..writing.reports import write_report
 from ..writing.run import properties_of
 from ..writing.whole_files import write_each
-from .base import RAIL_WORDS, TRACK_WORDS, RailAlgorithm
+from .base import RailAlgorithm
 
 if TYPE_CHECKING:
     from ...core.alignment.placed_axes import PlacedAxes
@@ -51,44 +49,7 @@ class Job:
 class MeasureTrackGeometry(RailAlgorithm):
     """The algorithm ``railextract:measuretrackgeometry``."""
 
-    NAME = "measuretrackgeometry"
-    LABEL = "Measure track geometry"
-    TAGS = (*RAIL_WORDS, *TRACK_WORDS, "twist", "radius", "curvature", "gradient", "quality", "chainage")
-    NEEDS = (("numpy",), ("scipy",), ("laspy",), ("lazrs",), ("pyproj",))
-    SUMMARY = "Measures gauge, cant, twist, radius and gradient along tracks, and their support by points."
-    PICTURE = "gauge.svg"
-    FIELDS = QUALITY_FIELDS
-    PAGES = ("parameters", "reference")
-    HELP = "\n\n".join(
-        (
-            "Takes the lines of Extract Rails, or lines drawn by hand, and returns points along each centerline.",
-            "With a point cloud, heights are measured again and smoothed over 1 m only, and sigma_mm, points and "
-            "bridged apply to each station. Without one, the heights are those of the rails, each rail's sigma_mm and "
-            "points are taken as uniform along it, and bridged is 1 where a rail is missing or its field gaps names "
-            "the place.",
-            "The findings and the report compare the gauge with that of the standard, with Gauge and with Other "
-            "gauges, whichever is nearest.",
-            "With an axis, points, findings and report have kilometres as well.",
-        )
-    )
-
-    def definitions(self) -> Definitions:
-        """Return the parameters and outputs in the order of the interface."""
-        return (
-            inputs.centerlines(),
-            inputs.rails_of_tracks(),
-            inputs.points_of_rails(),
-            groups.step(),
-            *groups.head(),
-            groups.other_gauges(),
-            groups.leave_out(),
-            groups.workers(),
-            *inputs.axis(optional=True),
-            outputs.quality(),
-            outputs.further(outputs.on_demand(outputs.findings())),
-            outputs.report(),
-            *outputs.quality_figures(),
-        )
+    JOB = JOB
 
     def read(self, values: ParameterValues) -> Job:
         """Read and check the parameters, in the main thread."""
@@ -103,7 +64,7 @@ class MeasureTrackGeometry(RailAlgorithm):
             standard,
             values.other_gauges(standard) if standard else (),
             values.cloud("POINTS") if values.filled("POINTS") else None,
-            values.command(),
+            values.command,
             values.axes(values.lines("INPUT").sourceCrs()) if values.has_axis() else None,
         )
 

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING
 from qgis.core import QgsPointXY, QgsTask
 
 from ...core.errors import Cancelled, OffCloudError, OffRailError, RailExtractError
+from ...core.jobs.clouds import CloudSource
 from ...core.parameters import GrowParameters
 from ...core.standards import SEARCHED_CLASSES, RailStandard
 from ..feedback import TaskProgress
-from ..reading.clouds import CloudSource, points_folder
+from ..reading.clouds import points_folder
 
 if TYPE_CHECKING:
     import numpy as np

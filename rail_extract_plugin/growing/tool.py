@@ -31,14 +31,15 @@ from qgis.PyQt.QtGui import QColor, QIcon
 from qgis.PyQt.QtWidgets import QAction, QComboBox, QFileDialog, QWidget
 
 from ...core.errors import RailExtractError
+from ...core.jobs.clouds import checked_crs
+from ...core.jobs.grow_rail_points import JOB
 from ...core.standards import DEFAULT, STANDARDS
-from ..algorithms.grow_rail_points import GrowRailPoints
 from ..dialog.cloud_parameter import file_filter
 from ..dialog.standard_setting import LAST
 from ..dialog.wheel import ignore_wheel
 from ..notices import notices
 from ..paths import ICONS
-from ..reading.clouds import checked_crs, cloud_source
+from ..reading.clouds import cloud_source
 from ..setup.dependencies import explain_missing, missing_packages
 from ..systems import system
 from .task import GrowTask, Shown
@@ -210,7 +211,7 @@ class GrowRails(QObject):
         RailExtractError
             There are several layers, seeds of another cloud wait, or packages are missing.
         """
-        missing = missing_packages(GrowRailPoints.NEEDS)
+        missing = missing_packages(JOB.needs)
         if missing:
             raise RailExtractError(explain_missing("Grow Rails", missing, []))
         active, layers = self._active_layer(), QgsProject.instance().mapLayers().values()
@@ -283,7 +284,7 @@ class GrowRails(QObject):
             "SEEDS": self._seed_layer().id(),
             "STANDARD": self.standards.currentData(),
         }
-        self.dialog = open_dialog(GrowRailPoints.NAME, values, self.parent())
+        self.dialog = open_dialog(JOB.name, values, self.parent())
         self.dialog.algorithmFinished.connect(self._clear_after)
 
     def _clear_after(self, successful: bool, results: dict[str, Any]) -> None:

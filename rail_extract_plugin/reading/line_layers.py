@@ -33,7 +33,8 @@ from ...core.design_places import check_line, check_places, has_stray
 from ...core.errors import CrsError, MissingError, ParameterError, RailExtractError
 from ...core.fields import CENTERLINE_FIELDS, RAIL_FIELDS, Field
 from ...core.frame import ORIGIN_STEP, LocalFrame
-from ...core.polyline import length_along
+from ...core.jobs.values import Rows
+from ...core.polyline import Polyline
 from ...core.progress import SILENT, Progress
 from ...core.rails import NO_GAPS, SAME_SUM_M, Centerline, RailLine
 
@@ -116,6 +117,19 @@ def read_surveyed(
     names = source.fields().names()
     id_field = next((one for one in ("rail_id", "track_id") if one in names), "")
     return tuple(_surveyed(feature, xyz, id_field) for feature, xyz in found), frame
+
+
+def rows_of(source: QgsProcessingFeatureSource, progress: Progress = SILENT) -> Rows:
+    """Return the values of the features by the name of the field, None where one is empty, and all names.
+
+    Raises
+    ------
+    ParameterError
+        QGIS drops the values of a field; see `value_of`.
+    """
+    names = source.fields().names()
+    features = progress.follow(source.getFeatures(QgsFeatureRequest(), GEOMETRY_AS_IT_IS), source.featureCount())
+    return [{name: value_of(feature, name) for name in names} for feature in features], names
 
 
 def read_guide(
@@ -462,7 +476,7 @@ def gaps_of(feature: QgsFeature, xyz: np.ndarray) -> np.ndarray:
     except ValueError:
         return NO_GAPS.copy()
     rise = np.diff(gaps.ravel()) if gaps.ndim == 2 and gaps.shape[1] == 2 else np.array([-1.0])
-    in_order = bool((rise >= 0).all()) and gaps[-1, 1] <= length_along(xyz[:, :2])[-1] + SAME_SUM_M
+    in_order = bool((rise >= 0).all()) and gaps[-1, 1] <= Polyline(xyz).length_m + SAME_SUM_M
     return gaps if in_order else NO_GAPS.copy()
 
 
@@ -475,9 +489,11 @@ def value_of(feature: QgsFeature, name: str) -> Any:
         QGIS drops the values of the field, as it does where GeoJSON has both whole numbers and texts in one.
     """
     index = feature.fields().lookupField(name)
+    value = feature.attribute(index) if index >= 0 else NULL
+    if value != NULL:
+        return value
     if index >= 0 and feature.fields().at(index).typeName() == MIXED:
         raise ParameterError(
             f"The field {name} has both numbers and texts, and QGIS drops them all: write all of them as texts."
         )
-    value = feature.attribute(index) if index >= 0 else NULL
-    return None if value == NULL else value
+    return None

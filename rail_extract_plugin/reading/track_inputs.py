@@ -11,12 +11,13 @@ from qgis.core import QgsProcessingFeatureSource
 
 from ...core.errors import RailExtractError
 from ...core.frame import LocalFrame
+from ...core.jobs.clouds import Bounds, CloudSource
+from ...core.jobs.reading import way
 from ...core.progress import Progress
 from ...core.rails import Centerline, RailLine, TrackGeometry
 from ...core.squares.spool import SpooledPoints
 from ...core.standards import RAIL_CLASS
-from .area_points import Area, check_same_plane, spool_points_in
-from .clouds import Bounds, CloudSource
+from .area_points import Area, spool_points_in
 from .line_layers import read_centerlines, read_rails
 
 MARGIN_M = 1.0
@@ -76,9 +77,8 @@ def read_inputs(
     """
     tracks, frame = read_centerlines(centerlines, progress.span(0.0, 0.1))
     lines, rail_frame = read_rails(rails, progress.span(0.1, 0.2), "RAILS", RAIL_CLASS)
-    check_same_plane("RAILS", rail_frame.crs_wkt, "INPUT", frame)
-    check_same_plane("INPUT", frame.crs_wkt, "RAILS", rail_frame)
-    lines = _moved(lines, rail_frame, frame)
+    shift = way("RAILS", rail_frame, "INPUT", frame)
+    lines = tuple(replace(line, xyz=line.xyz + shift) for line in lines)
     if cloud is None:
         progress.info("Without POINTS, sigma_mm and points of each rail are taken as uniform along it.")
         return TrackInputs(tracks, lines, (), frame)

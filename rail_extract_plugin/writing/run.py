@@ -11,7 +11,7 @@ from uuid import uuid4
 
 from qgis.core import QgsMapLayer, QgsProject
 
-from ..reading.clouds import CloudSource
+from ...core.jobs.clouds import CloudSource
 
 if TYPE_CHECKING:
     from ...core.frame import LocalFrame

@@ -233,9 +233,10 @@ def welcome(driver: Driver) -> Iterator:
     bar = iface.messageBar()
     driver.keep("at first", _message(bar))
     driver.picture("welcome")
-    kind, notices = type(algorithm("extractrails")), sys.modules["rail_extract.rail_extract_plugin.notices"].notices
+    job, notices = type(algorithm("extractrails")).JOB, sys.modules["rail_extract.rail_extract_plugin.notices"].notices
     packages = sys.modules["rail_extract.rail_extract_plugin.setup.dependencies"]
-    needs, kind.NEEDS = kind.NEEDS, (*kind.NEEDS, ("torch_of_nobody",))
+    needs = job.needs
+    object.__setattr__(job, "needs", (*needs, ("torch_of_nobody",)))
     packages.PACKAGES += (packages.Package("torch_of_nobody", "torch"),)
     notices.packages_installed.emit()
     yield 0.5
@@ -244,7 +245,8 @@ def welcome(driver: Driver) -> Iterator:
     later(_button_of(bar).click)
     dialog = yield lambda: window("AlgorithmDialog")
     driver.keep("first button opens", dialog.algorithm().name())
-    kind.NEEDS, packages.PACKAGES = needs, packages.PACKAGES[:-1]
+    object.__setattr__(job, "needs", needs)
+    packages.PACKAGES = packages.PACKAGES[:-1]
     driver.keep("log of the installation", (yield from press_run(dialog)))
     driver.picture("welcome_installed")
     yield from close(dialog)
@@ -348,8 +350,7 @@ def _save_all(driver: Driver, log: QTextEdit) -> Iterator:
 def missing(driver: Driver) -> Iterator:
     """Open an algorithm whose packages are missing, and follow the link of its message."""
     yield from install(ARCHIVE)
-    kind = type(algorithm("trainrailclassifier"))
-    kind.NEEDS = (("torch_of_nobody",),)
+    object.__setattr__(type(algorithm("trainrailclassifier")).JOB, "needs", (("torch_of_nobody",),))
     packages = sys.modules["rail_extract.rail_extract_plugin.setup.dependencies"]
     packages.PACKAGES = (packages.Package("torch_of_nobody", "torch"),)
     packages.OPTIONAL = sys.modules["rail_extract.rail_extract_plugin.runs.missing"].OPTIONAL = ("torch_of_nobody",)

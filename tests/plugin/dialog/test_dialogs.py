@@ -14,7 +14,7 @@ from rail_extract.rail_extract_plugin.dialog.help_panel import ADVANCED
 from rail_extract.rail_extract_plugin.dialog.sections import OTHERS, section_of
 from rail_extract.rail_extract_plugin.dialog.wording import for_user, with_labels
 
-NAMES = [one.NAME for one in ALGORITHMS]
+NAMES = [one.JOB.name for one in ALGORITHMS]
 SMALLEST_ICON = 16
 
 

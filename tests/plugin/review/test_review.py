@@ -10,7 +10,7 @@ from qgis.PyQt.QtCore import Qt
 from qgis.PyQt.QtWidgets import QMainWindow
 from rail_extract.core.fields import FINDING_FIELDS, RAIL_FIELDS
 from rail_extract.core.frame import LocalFrame
-from rail_extract.rail_extract_plugin.reading.clouds import CloudSource
+from rail_extract.core.jobs.clouds import CloudSource
 from rail_extract.rail_extract_plugin.review.findings import ACCEPTED, REJECTED, reviews
 from rail_extract.rail_extract_plugin.review.section_view import PAPER, POINT, RAIL
 from rail_extract.rail_extract_plugin.writing.layers import fields

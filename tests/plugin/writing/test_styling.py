@@ -26,9 +26,9 @@ from qgis.PyQt.QtCore import QSize
 from qgis.PyQt.QtGui import QColor
 from rail_extract.core.fields import PRODUCTS
 from rail_extract.core.frame import LocalFrame
+from rail_extract.core.jobs.clouds import CloudSource
 from rail_extract.rail_extract_plugin import compat
 from rail_extract.rail_extract_plugin.paths import STYLES
-from rail_extract.rail_extract_plugin.reading.clouds import CloudSource
 from rail_extract.rail_extract_plugin.writing.layers import fields
 from rail_extract.rail_extract_plugin.writing.run import properties_of
 from rail_extract.rail_extract_plugin.writing.styling import style_on_load
