@@ -16,7 +16,6 @@ from ..clouds.crs import MAX_COORDINATE, is_geographic, parse_crs
 from ..clouds.readers import CATALOGUE, paths_of
 from ..disk import Destination, writing
 from ..errors import CrsError, ParameterError, RailExtractError
-from ..frame import LocalFrame
 from ..jobs import declaration as kinds
 from ..jobs.clouds import Bounds, CloudSource, checked_crs
 from ..jobs.declaration import Job, Parameter
@@ -24,7 +23,6 @@ from ..jobs.result import Result
 from ..jobs.shared import WEB_PAGES
 from ..jobs.values import Rows, Values
 from ..progress import Progress
-from ..rails import RailLine
 from ..scratch import scratch_folder
 from ..tasks import Runner
 from ..workers.runner import workers
@@ -32,7 +30,8 @@ from .options import vector_module
 
 if TYPE_CHECKING:
     from ..airborne.survey import Guide
-    from ..comparison.tracks import SurveyedLine
+    from ..alignment.placed_axes import PlacedAxes
+    from ..jobs.lines import Lines
     from .vectors import Features
 
 Spell = Callable[[Parameter], str]
@@ -113,17 +112,13 @@ class FileValues(Values):
         features = self.features(name)
         return features.rows(), list(features.columns)
 
-    def tracks(self, name: str, progress: Progress) -> tuple[list[tuple[int, np.ndarray]], LocalFrame]:
-        """Read the number and the vertices, (n, 3) local metres, of each line, and their frame."""
-        return self.features(name).tracks()
+    def lines(self, name: str, progress: Progress) -> Lines:
+        """Read the lines of a layer."""
+        return self.features(name).lines(progress)
 
-    def rails(self, name: str, progress: Progress) -> tuple[list[RailLine], LocalFrame]:
-        """Read rails, in local metres of the frame that is returned as well."""
-        return self.features(name).rails()
-
-    def surveyed(self, name: str, progress: Progress) -> tuple[list[SurveyedLine], LocalFrame]:
-        """Read lines with their standard errors, in local metres of the frame that is returned as well."""
-        return self.features(name).surveyed()
+    def axes(self, crs_wkt: str | None) -> PlacedAxes:
+        """Read AXIS and what states its kilometres, in a coordinate system."""
+        return vector_module("AXIS", "kilometres").read_axes(self, None, crs_wkt)[0]
 
     @property
     def keeps(self) -> bool:

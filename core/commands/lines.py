@@ -11,6 +11,7 @@ from .options import (
     TABLE,
     Console,
     add_axis_arguments,
+    axis_of,
     destination_of,
     vector_module,
 )
@@ -30,7 +31,7 @@ def _stations(args: argparse.Namespace) -> None:
     vectors, kilometres = (vector_module("stations", name) for name in ("vectors", "kilometres"))
     output = destination_of("output", args.output, TABLE)
     places = vectors.read_features(args.input, "INPUT")
-    axes, plane = kilometres.read_axes(args, places.crs_wkt)
+    axes, plane = kilometres.read_axes(axis_of(args), places.crs_wkt)
     fields, columns = kilometres.located(places, axes, plane, Estimating(Console()))
     kilometres.write_copy(output, places, fields, columns)
     known = sum(math.isfinite(km) for km in columns[[field.name for field in fields].index("km")])

@@ -16,6 +16,7 @@ from ..alignment.km_text import HECTOMETRES, NOTATIONS
 from ..clouds.points import Request, ask
 from ..disk import Destination, writing
 from ..errors import ParameterError
+from ..jobs.shared import DECREASING, INCREASING
 from ..parameters import DEFAULT_WORKERS, GEOMETRY, LEARNED, LEAVE_OUT, MAX_WORKERS, METHODS, Parameters
 from ..progress import Progress
 from ..standards import DEFAULT, Gauge, RailStandard, read_gauges
@@ -81,6 +82,12 @@ def add_axis_arguments(parser: argparse._ActionsContainer) -> None:
     parser.add_argument("--jumps", metavar="FILE", help=text)
     text = f"how km_text writes kilometres (default: {HECTOMETRES})"
     parser.add_argument("--format", choices=tuple(NOTATIONS), default=HECTOMETRES, help=text)
+
+
+def axis_of(args: argparse.Namespace) -> dict[str, Any]:
+    """Return what the options say of an axis, by the names of its parameters."""
+    values = {"AXIS": args.axis, "START_KM": args.start_km, "DIRECTION": DECREASING if args.decreasing else INCREASING}
+    return {**values, "POSTS": args.posts, "POST_FIELD": args.post_field, "JUMPS": args.jumps, "FORMAT": args.format}
 
 
 LAYER, TABLE, REPORT = (".gpkg", ".dxf", ".csv"), (".gpkg",), (".html", ".htm")

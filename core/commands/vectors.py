@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -15,13 +14,12 @@ import pyogrio
 import shapely
 
 from ..airborne.survey import Guide, gauge_of
-from ..clouds.crs import import_pyproj, is_geographic, name_of, parse_crs, units
+from ..clouds.crs import import_pyproj, is_geographic, parse_crs, units
 from ..clouds.mask import Mask
-from ..comparison.tracks import SurveyedLine
 from ..design_places import check_line, check_places
-from ..errors import CrsError, MissingError, ParameterError
-from ..frame import ORIGIN_STEP, LocalFrame
-from ..rails import RailLine
+from ..errors import ParameterError
+from ..jobs.lines import Lines, system_of, without_steps
+from ..progress import Progress
 
 LAYER = "|layername="
 """What separates a file from the layer in it, as QGIS writes it."""
@@ -55,85 +53,11 @@ class Features:
             {name: _plain(values[number]) for name, values in self.columns.items()} for number in range(len(self.ids))
         ]
 
-    @property
-    def system(self) -> tuple[str | None, float, float]:
-        """Coordinate system, and its units in plan and in height, metres.
-
-        Raises
-        ------
-        CrsError
-            It is in degrees.
-        """
-        if self.crs_wkt is None:
-            return None, 1.0, 1.0
-        crs = parse_crs(self.crs_wkt)
-        if is_geographic(crs):
-            raise CrsError(
-                f"{self.option} is in degrees ({name_of(crs)}), where lengths can't be measured: reproject it, for "
-                "example to the UTM zone of the place."
-            )
-        return (self.crs_wkt, *units(crs))
-
-    def lines(self) -> tuple[list[tuple[int, dict[str, Any], np.ndarray]], LocalFrame]:
-        """Return feature id, values and vertices, (n, 3) local metres, of each line; z is NaN without heights.
-
-        Raises
-        ------
-        CrsError
-            The lines are in degrees.
-        ParameterError
-            There are none.
-        """
+    def lines(self, progress: Progress) -> Lines:
+        """Return the parts of all lines that have a length; see `Lines.of`."""
         rows = self.rows()
-        found = [(int(self.ids[n]), rows[n], _vertices(part)) for n, part in self.parts(None, "LineString")]
-        if not found:
-            raise MissingError(self.option, "line")
-        crs_wkt, horizontal_unit_m, vertical_unit_m = self.system
-        middle = np.median(np.concatenate([xyz for _, _, xyz in found]), axis=0)
-        origin = np.round(np.nan_to_num(middle) / ORIGIN_STEP) * ORIGIN_STEP
-        frame = LocalFrame(origin, horizontal_unit_m, vertical_unit_m, crs_wkt)
-        return [(feature, row, frame.to_local(xyz)) for feature, row, xyz in found], frame
-
-    def tracks(self) -> tuple[list[tuple[int, np.ndarray]], LocalFrame]:
-        """Return number and vertices of each line, which is its `track_id`, else the id of its feature; see `lines`."""
-        found, frame = self.lines()
-        return [(_whole(row.get("track_id"), feature), xyz) for feature, row, xyz in found], frame
-
-    def surveyed(self) -> tuple[list[SurveyedLine], LocalFrame]:
-        """Return the lines of a survey with their standard errors; see `lines`.
-
-        A line's number is its `rail_id`, else its `track_id`, else the id of its feature. With a `track_id` only, it is
-        a centerline.
-        """
-        found, frame = self.lines()
-        named = next((name for name in ("rail_id", "track_id") if name in self.columns), "")
-        return [
-            SurveyedLine(
-                _whole(row.get(named), feature),
-                xyz,
-                _number(row.get("sigma_mm")) / 1000,
-                _number(row.get("sigmaz_mm")) / 1000,
-                named != "track_id",
-            )
-            for feature, row, xyz in found
-        ], frame
-
-    def rails(self) -> tuple[list[RailLine], LocalFrame]:
-        """Return rails with their standard errors; see `lines`."""
-        found, frame = self.lines()
-        return [
-            RailLine(
-                xyz,
-                _whole(row.get("rail_id"), feature),
-                _whole(row.get("class_code"), 0),
-                _number(row.get("points")),
-                _number(row.get("resid_mm")),
-                _number(row.get("sigma_mm")),
-                _number(row.get("bridged_m")),
-                sigmaz_mm=_number(row.get("sigmaz_mm")),
-            )
-            for feature, row, xyz in found
-        ], frame
+        parts = ((int(self.ids[n]), rows[n], _vertices(part)) for n, part in self.parts(None, "LineString"))
+        return Lines.of(self.option, parts, list(self.columns), system_of(self.crs_wkt, progress), progress)
 
     def in_plane(self, crs_wkt: str | None) -> np.ndarray:
         """Return the geometries in another coordinate system; as they are if either is unknown."""
@@ -297,11 +221,7 @@ def read_mask(file: Path, crs_wkt: str | None) -> Mask:
 
 
 def _vertices(line: shapely.LineString) -> np.ndarray:
-    """Return the vertices of a line, (n, 3), without those that repeat the one before."""
-    xyz = shapely.get_coordinates(line, include_z=True)
-    if not np.isfinite(xyz[:, 2]).all():
-        xyz[:, 2] = np.nan
-    return xyz[np.append(True, np.any(np.diff(xyz[:, :2], axis=0) != 0, axis=1))]
+    return without_steps(shapely.get_coordinates(line, include_z=True))
 
 
 def _plain(value: Any) -> Any:
@@ -310,13 +230,5 @@ def _plain(value: Any) -> Any:
     return None if value is None or value != value else value
 
 
-def _number(value: Any) -> float:
-    return float(value) if isinstance(value, (int, float)) else math.nan
-
-
 def _word(value: Any) -> str:
     return "" if value is None else str(value)
-
-
-def _whole(value: Any, default: int) -> int:
-    return int(value) if isinstance(value, (int, float)) and float(value).is_integer() else default

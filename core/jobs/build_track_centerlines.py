@@ -3,9 +3,43 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
+from ..fields import CENTERLINES, RAILS
 from . import shared
 from .declaration import LINE_NEEDS, RAIL_WORDS, STEPS, TRACK_WORDS, Job, LayerInput
+
+if TYPE_CHECKING:
+    from ..progress import Progress
+    from .result import Result
+    from .values import Values
+
+READING = 0.1
+"""Fraction of the progress bar for reading the lines."""
+
+
+def _check(values: Values) -> None:
+    """Check the rail and the gauges."""
+    values.other_gauges(values.standard())
+
+
+def _run(values: Values, progress: Progress) -> Result:
+    """Pair the rails of each class."""
+    from ..checks.lines import with_tracks
+    from ..output.layers import lines_layer
+    from ..tracks.centerlines import tracks_of
+    from .result import Result
+
+    lines, standard = values.lines("INPUT", progress.span(0, READING)), values.standard()
+    rails = lines.rails(progress)
+    tracks = tracks_of(rails, values.settings(standard, values.other_gauges(standard)), progress.span(READING, 1))
+    progress.check()
+    layers = {
+        "OUTPUT": lambda: lines_layer(CENTERLINES, tracks),
+        "RAILS": lambda: lines_layer(RAILS, with_tracks(rails, tracks, progress)),
+    }
+    return Result(shared.figures_of(tracks, "CENTERLINE"), lines.frame, layers)
+
 
 JOB = Job(
     "buildtrackcenterlines",
@@ -37,4 +71,7 @@ JOB = Job(
     shared.CENTERLINE_FIGURES,
     STEPS,
     picture="gauge.svg",
+    call="build_track_centerlines",
+    check=_check,
+    run=_run,
 )

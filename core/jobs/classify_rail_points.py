@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ..errors import ParameterError
-from ..parameters import DEFAULT_GUIDE_DISTANCE_M
+from ..parameters import DEFAULT_GUIDE_DISTANCE_M, Parameters
 from ..progress import Estimating
 from ..standards import SEARCHED_CLASSES
 from . import shared
@@ -34,6 +34,7 @@ def _check(values: Values) -> None:
 
 def _run(values: Values, progress: Progress) -> Result:
     """Classify the cloud and write the copy."""
+    from ..checks.standard import warn_of_raw
     from ..classify.settings import Settings
     from ..labelling.files import Choice, classify_files, plan_output
     from ..labelling.finding import guide_of
@@ -48,7 +49,10 @@ def _run(values: Values, progress: Progress) -> Result:
         guide = guide_of(request, lines, values["GUIDE_DISTANCE"], values["ONLY_GUIDED"])
     settings = Settings(gauges_m, standard.head_width_m, values["KEEP_SINGLE"], guide, values.weights())
     with values.scratch() as folder, values.runner() as runner:
-        return classified(classify_files(request, settings, choice, output, folder, runner, progress), request)
+        found = classify_files(request, settings, choice, output, folder, runner, progress)
+    parameters = Parameters(standard.gauge_m, standard.head_width_m).with_gauges(values.other_gauges(standard))
+    warn_of_raw(request, found.figures, parameters, progress)
+    return classified(found, request)
 
 
 def classified(found: Found, request: Request) -> Result:

@@ -13,7 +13,8 @@ from ..standards import RAIL_CLASS
 
 if TYPE_CHECKING:
     from ..clouds.mask import Mask
-    from ..clouds.points import Request
+    from ..clouds.points import RailPoints, Request
+    from ..squares.spool import SpooledPoints
 
 Bounds = tuple[float, float, float, float]
 """Smallest x, smallest y, largest x, largest y."""
@@ -58,6 +59,53 @@ def request_points(source: CloudSource, class_codes: Sequence[int], bounds: Boun
 
     request = ask(source.paths, class_codes, source.crs_wkt, bounds(crs_of(source)), progress)
     return replace(request, mask=source.mask, leave_out=source.leave_out)
+
+
+def read_points(
+    source: CloudSource,
+    class_codes: Sequence[int],
+    bounds: BoundsIn,
+    progress: Progress,
+) -> tuple[RailPoints, ...]:
+    """Read the points on the heads of the rail classes.
+
+    Parameters
+    ----------
+    source : CloudSource
+    class_codes : sequence of int
+    bounds : callable
+        Returns the extent to read, given the cloud's coordinate system.
+    progress : Progress
+    """
+    from ..clouds.points import read_requested
+    from ..heads.on_heads import heads_of
+
+    found = read_requested(request_points(source, class_codes, bounds, progress), progress)
+    return tuple(heads_of(points) for points in found)
+
+
+def spool_points(
+    source: CloudSource,
+    class_codes: Sequence[int],
+    bounds: BoundsIn,
+    side_m: float,
+    folder: Path,
+    progress: Progress,
+) -> tuple[SpooledPoints, ...]:
+    """Sort the points of the rail classes into squares on disk, so that a cloud of any size fits.
+
+    Parameters
+    ----------
+    source, class_codes, bounds, progress
+        See `read_points`.
+    side_m : float
+        Side of the squares.
+    folder : Path
+        Where to write them.
+    """
+    from ..squares.spool import spool
+
+    return spool(request_points(source, class_codes, bounds, progress), side_m, folder, progress)
 
 
 def crs_of(source: CloudSource) -> str | None:

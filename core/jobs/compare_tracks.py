@@ -99,16 +99,16 @@ def _survey(values: Values, name: str, frame: LocalFrame | None, progress: Progr
     from .reading import way
 
     rails, sigma = SURVEYS[name]
-    surveyed, own = values.surveyed(name, progress)
-    frame = frame or own
-    shift = way(name, own, "REFERENCE", frame)
-    made = Survey([replace(line, xyz=line.xyz + shift) for line in surveyed])
+    lines = values.lines(name, progress)
+    frame = frame or lines.frame
+    shift = way(name, lines.frame, "REFERENCE", frame)
+    made = Survey([replace(line, xyz=line.xyz + shift) for line in lines.surveyed()])
     if values[sigma] is not None:
         made = replace(made, sigma_m=values[sigma] / 1000)
     if values.filled(rails):
-        found, theirs = values.rails(rails, progress)
-        shift = way(rails, theirs, "REFERENCE", frame)
-        made = replace(made, rails=[replace(rail, xyz=rail.xyz + shift) for rail in found])
+        found = values.lines(rails, progress)
+        shift = way(rails, found.frame, "REFERENCE", frame)
+        made = replace(made, rails=[replace(rail, xyz=rail.xyz + shift) for rail in found.rails(progress)])
     return made, frame
 
 

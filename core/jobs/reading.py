@@ -8,10 +8,11 @@ from ..alignment.cant_of_rails import cant_of_rails
 from ..alignment.elements import Alignment
 from ..alignment.measured import Track, stations_by_track, with_cant
 from ..alignment.table import alignments, check_table, frame_of, read_table
-from ..clouds.crs import is_geographic, name_of, parse_crs, same_plane, units
+from ..clouds.crs import name_of, parse_crs, same_plane, units
 from ..errors import CrsError
 from ..frame import LocalFrame
 from ..progress import SILENT, Progress
+from .lines import system_of
 from .values import Values
 
 
@@ -65,14 +66,15 @@ def read_tracks(values: Values, name: str, progress: Progress) -> tuple[list[Tra
     RailExtractError
         A layer has no lines, lacks a field, or states the cant of other tracks.
     """
-    lines, frame = values.tracks(name, progress)
+    read = values.lines(name, progress)
+    lines, frame = [(line.track_id, line.xyz) for line in read.centerlines()], read.frame
     if values.filled("QUALITY"):
         return with_cant(lines, stations_by_track(*values.rows("QUALITY", SILENT), "QUALITY"), "QUALITY", name), frame
     shapes = []
     if values.filled("RAILS"):
-        rails, theirs = values.rails("RAILS", progress)
-        shift = way("RAILS", theirs, name, frame)
-        shapes = [rail.xyz + shift for rail in rails]
+        rails = values.lines("RAILS", progress)
+        shift = way("RAILS", rails.frame, name, frame)
+        shapes = [xyz + shift for _, _, xyz in rails.parts]
     none = [np.zeros(len(xyz), dtype=bool) for _, xyz in lines]
     return [Track(one, xyz, cant_of_rails(xyz, shapes), own) for (one, xyz), own in zip(lines, none)], frame
 
@@ -90,18 +92,4 @@ def read_elements(values: Values, name: str, crs_wkt: str | None, progress: Prog
     table, fields = values.rows(name, progress)
     check_table(fields, name)
     rows = read_table(table, name)
-    return alignments(rows, frame_of(rows, _system(values.system(name) or crs_wkt, progress), name), progress)
-
-
-def _system(crs_wkt: str | None, progress: Progress) -> tuple[str | None, float, float]:
-    """Return a coordinate system with its units in plan and in height, metres."""
-    if crs_wkt is None:
-        progress.warning("The lines have no coordinate system: their coordinates are taken as metres.")
-        return None, 1.0, 1.0
-    crs = parse_crs(crs_wkt)
-    if is_geographic(crs):
-        raise CrsError(
-            f"The lines are in degrees ({name_of(crs)}), where lengths can't be measured: reproject them, for "
-            "example to the UTM zone of the place."
-        )
-    return (crs_wkt, *units(crs))
+    return alignments(rows, frame_of(rows, system_of(values.system(name) or crs_wkt, progress), name), progress)

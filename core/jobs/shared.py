@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..alignment.km_text import HECTOMETRES, NOTATIONS
 from ..design_numbers import KM
-from ..fields import LENGTH
+from ..fields import BRIDGED, LENGTH, SIGMA
 from ..frpdf import DEVICES, ENGINES, MAX_PASSES
 from ..frpdf.models import NAMES
 from ..parameters import (
@@ -44,6 +45,9 @@ from .declaration import (
     System,
     Text,
 )
+
+if TYPE_CHECKING:
+    from ..rails import TrackGeometry
 
 # The maxima below only reject values that must be millimetres in a field of metres; they are not recommendations.
 
@@ -278,7 +282,7 @@ CLEANUP: tuple[Parameter, ...] = (
     Choice(
         "ENGINE",
         "Engine of the network",
-        "Python package that runs the network: PyTorch or OpenCV. AUTO uses the faster of those installed.",
+        "Python package that runs the network: PyTorch or OpenCV. AUTO uses PyTorch if it is installed.",
         advanced=True,
         options=ENGINES,
         default=Parameters.engine,
@@ -571,3 +575,13 @@ ENGINE_USED = Figure("ENGINE_USED", "Engine that ran the network", "text")
 def figures_of(lines: Sequence[Any], what: str) -> dict[str, Any]:
     """Return the number and length of lines: RAIL_COUNT and RAIL_LENGTH if `what` is RAIL."""
     return {f"{what}_COUNT": len(lines), f"{what}_LENGTH": LENGTH.value(sum(line.length_m for line in lines))}
+
+
+def figures_of_stations(tracks: Sequence[TrackGeometry]) -> dict[str, Any]:
+    """Return the number of stations, the standard error and the length without points, as outputs."""
+    sigma = [value for track in tracks for value in track.sigma_mm if math.isfinite(value)]
+    return {
+        "STATION_COUNT": sum(len(track.chainage_m) for track in tracks),
+        "SIGMA": SIGMA.value(math.sqrt(sum(value**2 for value in sigma) / len(sigma))) if sigma else None,
+        "BRIDGED_LENGTH": BRIDGED.value(sum(track.bridged_m for track in tracks)),
+    }

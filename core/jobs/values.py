@@ -30,12 +30,11 @@ if TYPE_CHECKING:
     import numpy as np
 
     from ..airborne.survey import Guide
+    from ..alignment.placed_axes import PlacedAxes
     from ..clouds.points import Request
-    from ..comparison.tracks import SurveyedLine
-    from ..frame import LocalFrame
     from ..progress import Progress
-    from ..rails import RailLine
     from ..tasks import Runner
+    from .lines import Lines
 
 NUMBERS = {
     "SMOOTHING_XY": "smoothing_xy_m",
@@ -125,16 +124,12 @@ class Values(ABC):
         """Read the fields of a layer."""
 
     @abstractmethod
-    def tracks(self, name: str, progress: Progress) -> tuple[list[tuple[int, np.ndarray]], LocalFrame]:
-        """Read the number and the vertices, (n, 3) local metres, of each line, and their frame."""
+    def lines(self, name: str, progress: Progress) -> Lines:
+        """Read the lines of a layer."""
 
     @abstractmethod
-    def rails(self, name: str, progress: Progress) -> tuple[Sequence[RailLine], LocalFrame]:
-        """Read rails, in local metres of the frame that is returned as well."""
-
-    @abstractmethod
-    def surveyed(self, name: str, progress: Progress) -> tuple[Sequence[SurveyedLine], LocalFrame]:
-        """Read lines with their standard errors, in local metres of the frame that is returned as well."""
+    def axes(self, crs_wkt: str | None) -> PlacedAxes:
+        """Read AXIS and what states its kilometres, in a coordinate system."""
 
     @abstractmethod
     def cloud(self, name: str = "INPUT") -> CloudSource:

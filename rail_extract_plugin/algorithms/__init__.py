@@ -5,12 +5,10 @@ from __future__ import annotations
 from ...core.jobs import JOBS
 from ...core.jobs.declaration import Job
 from .base import JobAlgorithm, RailAlgorithm
-from .build_track_centerlines import BuildTrackCenterlines
 from .check_installation import CheckInstallation
 from .extract_rails import ExtractRails
 from .frpdf_cleanup import FrpdfCleanup
 from .install_packages import InstallPackages
-from .measure_track_geometry import MeasureTrackGeometry
 from .rasterize_rail_points import RasterizeRailPoints
 from .station_along_axis import StationAlongAxis
 from .vectorize_rails import VectorizeRails
@@ -28,8 +26,6 @@ OWN = {
         RasterizeRailPoints,
         FrpdfCleanup,
         VectorizeRails,
-        BuildTrackCenterlines,
-        MeasureTrackGeometry,
         StationAlongAxis,
     )
 }

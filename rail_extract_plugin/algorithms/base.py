@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping
 from functools import partial
 from typing import Any
@@ -126,7 +127,7 @@ class RailAlgorithm(QgsProcessingAlgorithm):
         try:
             self.destinations = self._destinations(parameters, context)
             self._job = self._read(parameters, context)
-            self.layer_properties = new_run()
+            self.layer_properties = new_run(self.displayName(), parameters.get("INPUT"), context)
         except BaseException as error:
             raise QgsProcessingException(sentence_for(error, self.parameterDefinitions())) from None
         return True
@@ -147,7 +148,12 @@ class RailAlgorithm(QgsProcessingAlgorithm):
             progress.set_fraction(1)
             return results
         # PyQt keeps what is raised here: with the error as its context, files that it refers to would stay open.
+        notices.run_left.emit(sys._getframe())
         raise QgsProcessingException(reason)
+
+    def remember(self, properties: Mapping[str, str]) -> None:
+        """Have the layers of the run state further properties."""
+        self.layer_properties = {**self.layer_properties, **properties}
 
     def _destinations(self, parameters: dict[str, Any], context: QgsProcessingContext) -> dict[str, Destination]:
         """Check the files of the outputs, and remember what they replace."""
@@ -265,7 +271,7 @@ class JobAlgorithm(RailAlgorithm):
         if result.cloud is not None:
             cloud = values.cloud(result.cloud.name)
             shown = result.cloud.class_codes, result.cloud.head_width_m
-            self.layer_properties = properties_of(cloud, *shown, result.frame)
+            self.remember(properties_of(cloud, *shown, result.frame))
         for sentence in result.sentences:
             progress.info(sentence)
         writers = layer_writers(values, result.layers, result.frame)

@@ -10,14 +10,13 @@ from ...core.errors import ParameterError
 from ...core.frpdf.models import choose as choose_model
 from ...core.jobs.clouds import CloudSource, checked_crs, request_points
 from ...core.jobs.extract_rails import JOB
-from ...core.jobs.shared import figures_of
+from ...core.jobs.shared import figures_of, figures_of_stations
 from ...core.parameters import LEARNED
 from ...core.progress import Estimating, Progress
 from ...core.standards import DEFAULT, SEARCHED_CLASSES, Gauge, RailStandard
 from ..dialog.parameter_values import ParameterValues
 from ..reading.clouds import points_folder
-from ..systems import system
-from ..writing.layers import figures_of_stations, layer_writers, write_raster
+from ..writing.layers import layer_writers, write_raster
 from ..writing.reports import write_report
 from ..writing.run import properties_of
 from ..writing.whole_files import write_each
@@ -88,7 +87,7 @@ class ExtractRails(RailAlgorithm):
             return None
         if not any(map(values.wanted, MEASURED)):
             raise ParameterError("AXIS gives QUALITY, FINDINGS and REPORT kilometres: name at least one of these.")
-        return values.axes(system(checked_crs(cloud)))
+        return values.axes(checked_crs(cloud))
 
     def _detected(self, job: Job, request: Request, values: ParameterValues, progress: Progress) -> Job:
         """Return the job with the rail standard that fits the points."""
@@ -124,7 +123,7 @@ class ExtractRails(RailAlgorithm):
         for failure in network.failures:
             progress.warning(failure)
         origin = Origin(job.cloud.paths, job.standard, job.other_gauges, job.command, settings)
-        self.layer_properties = properties_of(job.cloud, job.class_codes, job.standard.head_width_m, network.frame)
+        self.remember(properties_of(job.cloud, job.class_codes, job.standard.head_width_m, network.frame))
         for sentence in summary(network, origin.gauges_m):
             progress.info(sentence)
         written = self._write(job, network, origin, values)

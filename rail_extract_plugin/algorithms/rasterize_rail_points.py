@@ -6,12 +6,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from ...core.frpdf.models import choose as choose_model
-from ...core.jobs.clouds import CloudSource
+from ...core.jobs.clouds import CloudSource, read_points
 from ...core.jobs.rasterize_rail_points import JOB
 from ...core.progress import Progress
 from ...core.standards import RailStandard
 from ..dialog.parameter_values import ParameterValues
-from ..reading.clouds import read_points
 from ..writing.layers import write_raster
 from .base import RailAlgorithm
 
@@ -41,11 +40,11 @@ class RasterizeRailPoints(RailAlgorithm):
 
     def compute(self, job: Job, values: ParameterValues, progress: Progress) -> dict[str, Any]:
         """Rasterize each class, then write the file."""
+        from ...core.jobs.track_inputs import SQUARE_M
         from ...core.output.raster_file import header_for
         from ...core.raster import cell_size, rasterize
         from ...core.squares.density import plausible
         from ...core.squares.grid import MemorySource
-        from ..reading.track_inputs import SQUARE_M
 
         clouds = read_points(job.cloud, job.class_codes, values.extent, progress.span(0, READING))
         dense = {source.class_code for source in plausible([MemorySource(one, SQUARE_M) for one in clouds], progress)}

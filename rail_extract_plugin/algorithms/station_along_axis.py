@@ -51,7 +51,7 @@ class StationAlongAxis(RailAlgorithm):
             raise RailExtractError("INPUT is a table without places: give a layer of points, lines or polygons.")
         prepare_system(wkt_of(source.sourceCrs()) or None)
         plane = plane_of(values.axis_crs(), source.sourceCrs())
-        return Job(source, plane, values.axes(plane))
+        return Job(source, plane, values.axes(wkt_of(plane) or None))
 
     def compute(self, job: Job, values: ParameterValues, progress: Progress) -> dict[str, Any]:
         """Locate the features, then write them with their kilometres."""

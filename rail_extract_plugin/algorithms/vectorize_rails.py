@@ -48,9 +48,9 @@ class VectorizeRails(RailAlgorithm):
         """Vectorize each class, then write the lines."""
         from ...core.checks.lines import warn_of_rails
         from ...core.fields import RAILS
+        from ...core.jobs.area_points import Area, read_points_in
         from ...core.output.layers import lines_layer
         from ...core.squares.steps import lines_of
-        from ..reading.area_points import Area, read_points_in
         from ..reading.geotiff import read_rasters
         from ..reading.rasters import moved
 

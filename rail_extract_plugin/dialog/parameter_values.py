@@ -38,11 +38,9 @@ if TYPE_CHECKING:
     from ...core.airborne.survey import Guide
     from ...core.alignment.placed_axes import PlacedAxes
     from ...core.clouds.mask import Mask
-    from ...core.comparison.tracks import SurveyedLine
-    from ...core.frame import LocalFrame
+    from ...core.jobs.lines import Lines
     from ...core.output.raster_file import RasterHeader
     from ...core.progress import Progress
-    from ...core.rails import RailLine
     from ...core.tasks import Runner
 
 TYPES_WITHOUT_LINES = (
@@ -107,7 +105,7 @@ class ParameterValues(Values):
             if isinstance(one, kinds.Cloud) and self.filled(one.name):
                 self.cloud(one.name)
             elif isinstance(one, kinds.LayerInput) and not one.transformed and self.filled(one.name):
-                read = self.lines if one.kinds == (kinds.LINE,) else self.table
+                read = self._lines_source if one.kinds == (kinds.LINE,) else self.table
                 self._opened[one.name] = read(one.name)
 
     def title(self, name: str) -> str:
@@ -138,24 +136,11 @@ class ParameterValues(Values):
 
         return rows_of(self._opened[name], progress)
 
-    def tracks(self, name: str, progress: Progress) -> tuple[list[tuple[int, np.ndarray]], LocalFrame]:
-        """Read the number and the vertices, (n, 3) local metres, of each line, and their frame."""
-        from ..reading.line_layers import read_centerlines
+    def lines(self, name: str, progress: Progress) -> Lines:
+        """Read the lines of a layer."""
+        from ..reading.line_layers import read_lines
 
-        lines, frame = read_centerlines(self._opened[name], progress, name)
-        return [(line.track_id, line.xyz) for line in lines], frame
-
-    def rails(self, name: str, progress: Progress) -> tuple[Sequence[RailLine], LocalFrame]:
-        """Read rails, in local metres of the frame that is returned as well."""
-        from ..reading.line_layers import read_rails
-
-        return read_rails(self._opened[name], progress, name)
-
-    def surveyed(self, name: str, progress: Progress) -> tuple[Sequence[SurveyedLine], LocalFrame]:
-        """Read lines with their standard errors, in local metres of the frame that is returned as well."""
-        from ..reading.line_layers import read_surveyed
-
-        return read_surveyed(self._opened[name], progress, name)
+        return read_lines(self._opened[name], progress, name)
 
     def number(self, name: str) -> float:
         """Read a number.
@@ -227,7 +212,7 @@ class ParameterValues(Values):
         prepare_system(header.frame.crs_wkt)
         return path, header
 
-    def lines(self, name: str) -> QgsProcessingFeatureSource:
+    def _lines_source(self, name: str) -> QgsProcessingFeatureSource:
         """Return a line layer.
 
         Raises
@@ -242,7 +227,11 @@ class ParameterValues(Values):
         prepare_system(wkt_of(source.sourceCrs()))
         return source
 
-    def axes(self, crs: QgsCoordinateReferenceSystem) -> PlacedAxes:
+    def axes(self, crs_wkt: str | None) -> PlacedAxes:
+        """Read AXIS and what states its kilometres, in a coordinate system."""
+        return self._once("AXIS", lambda: self._axes(system(crs_wkt)))
+
+    def _axes(self, crs: QgsCoordinateReferenceSystem) -> PlacedAxes:
         """Read AXIS and what states its kilometres, in a coordinate system.
 
         Raises

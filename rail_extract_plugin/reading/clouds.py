@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from qgis.core import (
     QgsCoordinateReferenceSystem,
@@ -17,13 +17,8 @@ from qgis.core import (
 )
 
 from ...core.errors import CloudError
-from ...core.jobs.clouds import BoundsIn, CloudSource, request_points
-from ...core.progress import Progress
+from ...core.jobs.clouds import CloudSource
 from ...core.scratch import scratch_folder, sweep
-
-if TYPE_CHECKING:
-    from ...core.clouds.points import RailPoints
-    from ...core.squares.spool import SpooledPoints
 
 
 def cloud_source(value: Any, context: QgsProcessingContext) -> CloudSource:
@@ -74,53 +69,6 @@ def _check_as_in_file(layer: QgsPointCloudLayer) -> None:
 
 def _system_name(crs: QgsCoordinateReferenceSystem) -> str:
     return crs.authid() or crs.description() or "no coordinate system"
-
-
-def read_points(
-    source: CloudSource,
-    class_codes: Sequence[int],
-    bounds: BoundsIn,
-    progress: Progress,
-) -> tuple[RailPoints, ...]:
-    """Read the points on the heads of the rail classes.
-
-    Parameters
-    ----------
-    source : CloudSource
-    class_codes : sequence of int
-    bounds : callable
-        Returns the extent to read, given the cloud's coordinate system.
-    progress : Progress
-    """
-    from ...core.clouds.points import read_requested
-    from ...core.heads.on_heads import heads_of
-
-    found = read_requested(request_points(source, class_codes, bounds, progress), progress)
-    return tuple(heads_of(points) for points in found)
-
-
-def spool_points(
-    source: CloudSource,
-    class_codes: Sequence[int],
-    bounds: BoundsIn,
-    side_m: float,
-    folder: Path,
-    progress: Progress,
-) -> tuple[SpooledPoints, ...]:
-    """Sort the points of the rail classes into squares on disk, so that a cloud of any size fits.
-
-    Parameters
-    ----------
-    source, class_codes, bounds, progress
-        See `read_points`.
-    side_m : float
-        Side of the squares.
-    folder : Path
-        Where to write them.
-    """
-    from ...core.squares.spool import spool
-
-    return spool(request_points(source, class_codes, bounds, progress), side_m, folder, progress)
 
 
 @contextmanager

@@ -27,7 +27,7 @@ from qgis.core import (
 
 from ...core.disk import Destination
 from ...core.errors import RailExtractError
-from ...core.fields import BRIDGED, PLACES, SIGMA, UNKNOWN_IN_METRES, Field, Product
+from ...core.fields import PLACES, UNKNOWN_IN_METRES, Field, Product
 from ...core.progress import SILENT, Progress
 from ..compat import INTEGER, REAL, TEXT, field
 from ..dialog.parameter_values import ParameterValues
@@ -42,7 +42,6 @@ if TYPE_CHECKING:
     from ...core.frame import LocalFrame
     from ...core.output.layers import Layer
     from ...core.output.raster_file import RasterHeader
-    from ...core.rails import TrackGeometry
     from ...core.raster import RailRaster
 
 KINDS = {int: INTEGER, float: REAL, str: TEXT}
@@ -205,16 +204,6 @@ def write_raster(
         write_rasters(new, header, rasters, progress)
     _style(values, name, path, "raster")
     return {name: path}
-
-
-def figures_of_stations(tracks: Sequence[TrackGeometry]) -> dict[str, Any]:
-    """Return the number of stations, the standard error and the length without points, as outputs."""
-    sigma = [value for track in tracks for value in track.sigma_mm if math.isfinite(value)]
-    return {
-        "STATION_COUNT": sum(len(track.chainage_m) for track in tracks),
-        "SIGMA": SIGMA.value(math.sqrt(sum(value**2 for value in sigma) / len(sigma))) if sigma else None,
-        "BRIDGED_LENGTH": BRIDGED.value(sum(track.bridged_m for track in tracks)),
-    }
 
 
 def output_crs(wkt: str | None) -> QgsCoordinateReferenceSystem:

@@ -7,7 +7,7 @@ import pytest
 import rail_extract as rx
 from rail_extract.__main__ import main, parse
 from rail_extract.core.commands.files import read_value
-from rail_extract.core.errors import ParameterError
+from rail_extract.core.errors import ParameterError, RailExtractError
 from rail_extract.core.jobs import CALLS, JOBS
 from rail_extract.core.jobs.declaration import Choice, Number
 
@@ -105,13 +105,51 @@ def test_a_number_out_of_its_limits_is_refused(given):
         read_value(Number("N", "", default=1.0, high=9.0), given)
 
 
-def test_a_function_gives_layers_figures_and_a_report(tmp_path):
+def written(path, lines, **fields):
+    """Write 3D lines, (n, 3), in UTM zone 43 N."""
     pyogrio, shapely = pytest.importorskip("pyogrio"), pytest.importorskip("shapely")
-    line = np.column_stack([np.linspace(500_000, 500_040, 41), np.full(41, 3e6), np.full(41, 100.0)])
+    shapes = [shapely.to_wkb(shapely.linestrings(line), output_dimension=3) for line in lines]
+    values = [np.array(one) for one in fields.values()]
+    pyogrio.raw.write(
+        str(path), np.array(shapes, object), values, list(fields), geometry_type="LineString Z", crs="EPSG:32643",
+        layer="lines",
+    )  # fmt: skip
+    return path
+
+
+def straight(left_m=0.0, up_m=0.0, length_m=40):
+    """A line that runs east."""
+    x = np.linspace(500_000, 500_000 + length_m, length_m + 1)
+    return np.column_stack([x, np.full(len(x), 3e6 + left_m), np.full(len(x), 100.0 + up_m)])
+
+
+def test_two_rails_make_a_track_of_their_gauge(tmp_path, capsys):
+    rails = written(tmp_path / "rails.gpkg", [straight(1.507, 0.02), straight()[::-1]], rail_id=[7, 8])
+    paired = rx.build_track_centerlines(rails, output=tmp_path / "tracks.gpkg")
+    assert paired.figures == {"CENTERLINE_COUNT": 1, "CENTERLINE_LENGTH": pytest.approx(40, abs=0.1)}
+    measured = rx.measure_track_geometry(tmp_path / "tracks.gpkg", rails, step=2.0)
+    quality = measured.layers["OUTPUT"]()
+    values = dict(zip((field.name for field in quality.product.fields), quality.columns))
+    np.testing.assert_allclose(values["gauge_mm"], 1000 * (np.hypot(1.507, 0.02) - 0.072), atol=0.2)
+    np.testing.assert_allclose(np.abs(values["cant_mm"]), 20, atol=0.2)
+    words = ["measure-track-geometry", str(tmp_path / "tracks.gpkg"), str(rails), "--step", "2"]
+    assert main([*words, "--report", str(tmp_path / "report.html")]) == 0
+    assert "one rail" not in capsys.readouterr().err
+    assert "tracks.gpkg" in (tmp_path / "report.html").read_text(encoding="utf-8")
+
+
+def test_a_stray_vertex_is_refused_by_files_as_by_qgis(tmp_path):
+    line = straight()
+    line[7, 1] = -3e6
+    stray = written(tmp_path / "stray.gpkg", [line])
+    with pytest.raises(RailExtractError, match="input has a line .feature 1. with a stray vertex: repair or delete"):
+        rx.build_track_centerlines(stray, tmp_path / "out.gpkg")
+
+
+def test_a_function_gives_layers_figures_and_a_report(tmp_path):
+    pyogrio = pytest.importorskip("pyogrio")
     for name, rise_m in (("before", 0.0), ("after", 0.012)):
-        shape = np.array([shapely.to_wkb(shapely.linestrings(line + [0, 0, rise_m]), output_dimension=3)], object)
-        file = str(tmp_path / f"{name}.gpkg")
-        pyogrio.raw.write(file, shape, [], [], geometry_type="LineString Z", crs="EPSG:32643", layer="lines")
+        written(tmp_path / f"{name}.gpkg", [straight(0, rise_m)])
     result = rx.compare(tmp_path / "before.gpkg", tmp_path / "after.gpkg", ignore_shift=False, reference_sigma=1,
                         input_sigma=1, output=tmp_path / "new" / "moved.gpkg")  # fmt: skip
     assert result.figures["COMPARED_LENGTH"] == pytest.approx(40, abs=1)

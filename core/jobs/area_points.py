@@ -7,16 +7,15 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
-from ...core.clouds.points import RailPoints
-from ...core.errors import NoRailPointsError
-from ...core.frame import LocalFrame
-from ...core.jobs.clouds import Bounds, BoundsIn, CloudSource, crs_of
-from ...core.jobs.reading import check_same_plane
-from ...core.progress import Progress
-from .clouds import read_points, spool_points
+from ..clouds.points import RailPoints
+from ..errors import NoRailPointsError
+from ..frame import LocalFrame
+from ..progress import Progress
+from .clouds import Bounds, BoundsIn, CloudSource, crs_of, read_points, spool_points
+from .reading import check_same_plane
 
 if TYPE_CHECKING:
-    from ...core.squares.spool import SpooledPoints
+    from ..squares.spool import SpooledPoints
 
 Points = TypeVar("Points", RailPoints, "SpooledPoints")
 
