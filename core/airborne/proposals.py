@@ -72,7 +72,6 @@ class Proposals:
     Attributes
     ----------
     guides : tuple of ProposedGuide
-    frame : LocalFrame
     density : float
         Points per square metre.
     """

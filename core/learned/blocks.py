@@ -131,7 +131,6 @@ def cut(thinned: Thinned, side_m: float) -> list[Block]:
 
     Parameters
     ----------
-    thinned : Thinned
     side_m : float
         Side of the square.
     """

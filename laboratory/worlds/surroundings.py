@@ -70,6 +70,8 @@ class Surroundings:
     names : tuple of str
         What was built.
     half_width_m : float
+    paved_m : tuple of float or None
+        Section along the reference line, metres, in which rails are in a pavement.
     """
 
     bed: str
@@ -78,6 +80,7 @@ class Surroundings:
     whole: Thing
     names: tuple[str, ...]
     half_width_m: float
+    paved_m: tuple[float, float] | None = None
 
 
 def draw_surroundings(seed: int, railway: Railway, from_above: bool) -> Surroundings:
@@ -97,7 +100,8 @@ def draw_surroundings(seed: int, railway: Railway, from_above: bool) -> Surround
     _furnish(built, bed, land, crossing)
     names = (*(["level crossing"] if crossing else []), *built.names)
     whole = _together(seed, railway, (*base, *built.things))
-    return Surroundings(bed, land, bedding, whole, names, half_width_m)
+    paved_m = (0.0, railway.reference.length_m) if bed == STREET else crossing
+    return Surroundings(bed, land, bedding, whole, names, half_width_m, paved_m)
 
 
 def _together(seed: int, railway: Railway, built: Sequence[Thing]) -> Thing:
