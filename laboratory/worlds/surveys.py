@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Union
 
@@ -76,27 +77,40 @@ def draw_kind(seed: int) -> str:
     return chosen(stream(seed, "kind of survey"), KINDS)
 
 
-def draw_survey(seed: int, railway: Railway, half_width_m: float) -> Survey:
-    """Draw the survey of a world."""
+def draw_survey(seed: int, railway: Railway, half_width_m: float, rise: Callable[[float], float], wide: bool) -> Survey:
+    """Draw the survey of a world.
+
+    Parameters
+    ----------
+    seed : int
+    railway : Railway
+    half_width_m : float
+    rise : callable
+        Height of the ground above the rails, by the place to the left: scanners stand on it.
+    wide : bool
+        Whether there is room beside the tracks, as there is not in a tunnel.
+    """
     kind, rng, length_m = draw_kind(seed), stream(seed, "survey"), railway.reference.length_m
     if kind == MOBILE:
-        return _mobile(rng, railway, length_m)
+        return _mobile(rng, railway, length_m, rise, wide)
     if kind == TRIPOD:
-        return _tripods(rng, railway, length_m)
+        return _tripods(rng, railway, length_m, rise, wide)
     if kind == DRONE:
         return _drone(rng, half_width_m, length_m)
     return Survey(IMAGES, (_camera(rng, 2 * half_width_m * length_m),), has_times=False)
 
 
-def _mobile(rng: np.random.RandomState, railway: Railway, length_m: float) -> Survey:
+def _mobile(
+    rng: np.random.RandomState, railway: Railway, length_m: float, rise: Callable[[float], float], wide: bool
+) -> Survey:
     """Draw one to four passes on the first track, or beside the tracks."""
     count = chosen(rng, PASSES)
-    beside = maybe(rng, 0.12)
+    beside = maybe(rng, 0.12) and wide
     low, high = railway.lefts_m
     if beside:
         side = one_of(rng, (1, -1))
         left_m = (high if side > 0 else low) + side * rng.uniform(4.0, 7.0)
-        height_m = rng.uniform(1.8, 3.0)
+        height_m = max(rise(left_m), 0.0) + rng.uniform(1.8, 3.0)
     else:
         left_m, height_m = rng.uniform(-0.8, 0.8), rng.uniform(2.0, 4.8)
     profile_m, ray_rad = even_in_log(rng, 0.02, 0.12), even_in_log(rng, 0.0010, 0.0035)
@@ -139,7 +153,9 @@ def _apart(rng: np.random.RandomState, count: int, most_m: float = APART_M) -> n
     return error * size_m / widest
 
 
-def _tripods(rng: np.random.RandomState, railway: Railway, length_m: float) -> Survey:
+def _tripods(
+    rng: np.random.RandomState, railway: Railway, length_m: float, rise: Callable[[float], float], wide: bool
+) -> Survey:
     """Draw one to four places of a tripod, on either side of the tracks."""
     count = rng.randint(1, 5)
     low, high = railway.lefts_m
@@ -148,14 +164,14 @@ def _tripods(rng: np.random.RandomState, railway: Railway, length_m: float) -> S
     scanners, apart = [], _apart(rng, count, 0.002)
     for number in range(count):
         side = one_of(rng, (1, -1))
-        left_m = (high if side > 0 else low) + side * rng.uniform(1.9, 4.0)
+        left_m = (high if side > 0 else low) + side * rng.uniform(1.9, 4.0 if wide else 2.5)
         stand_m = (number + rng.uniform(0.25, 0.75)) * length_m / count
         scanners.append(
             RawScanner(
                 profile_step_m=STAND_STEP_M,
                 ray_step_rad=ray_rad,
                 left_m=left_m,
-                height_m=height_m,
+                height_m=max(rise(left_m), 0.0) + height_m,
                 noise_m=noise_m,
                 half_range_m=rng.uniform(40.0, 100.0),
                 swing=0.0,
