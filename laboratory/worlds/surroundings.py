@@ -28,7 +28,7 @@ from ..scenes.raw_world import (
 from .draws import chosen, even_in_log, maybe, one_of, stream
 from .rails import lay
 from .railway import Railway
-from .surveys import FROM_ABOVE, TRIPOD
+from .surveys import FROM_ABOVE, IMAGES, TRIPOD
 
 BALLAST, SLAB, STREET = "ballast", "slab", "street"
 BEDS = {
@@ -88,18 +88,23 @@ class Surroundings:
 
 
 def draw_surroundings(seed: int, railway: Railway, survey: str) -> Surroundings:
-    """Draw what the tracks of a world lie in, so that a kind of survey can be made there."""
+    """Draw what the tracks of a world lie in, so that a kind of survey shows them.
+
+    Blurred images show nothing of rails that lie level with a road or with their ballast.
+    """
     rng = stream(seed, "surroundings")
     bed = chosen(rng, BEDS[railway.family])
-    if bed == STREET and not railway.plain:
+    if bed == STREET and (survey == IMAGES or not railway.plain):
         bed = BALLAST
     land = chosen(rng, LANDS[railway.family])
     if (land in (TUNNEL, BRIDGE) and not railway.plain) or (land == TUNNEL and survey in FROM_ABOVE) or bed == STREET:
         land = FLAT
-    bedding = _bedding(rng, railway, bed)
+    bedding = _bedding(rng, railway, bed, survey)
     half_width_m = _half_width(rng, railway)
     built = _Built(rng, railway, bedding, half_width_m)
     crossing = _crossing(rng, railway, bed, land)
+    if survey == IMAGES:
+        crossing = None
     terrain = Terrain.drawn(rng, railway, land)
     base = _base(rng, railway, bed, terrain, crossing)
     _furnish(built, bed, land, crossing, survey)
@@ -130,11 +135,13 @@ def _half_width(rng: np.random.RandomState, railway: Railway) -> float:
     return float(min(widest + branches + rng.uniform(3.5, 8.0), 0.45 / max(sharpest, 1e-3) + 0.4 * widest))
 
 
-def _bedding(rng: np.random.RandomState, railway: Railway, bed: str) -> Bedding:
+def _bedding(rng: np.random.RandomState, railway: Railway, bed: str, survey: str) -> Bedding:
     """Draw the ballast, from 12 cm below the rails' feet to their heads, and the sleepers."""
     height_m = RAIL_HEIGHT_M * railway.standard.head_width_m / 0.072
     fill = chosen(rng, {"tidy": 60, "thin": 15, "full": 17, "buried": 8})
     fills = {"tidy": (0.0, 0.05), "thin": (0.05, 0.11), "full": (-0.10, 0.0), "buried": (-height_m + 0.01, -0.10)}
+    if fill == "buried" and survey == IMAGES:
+        fill = "full"
     timber = maybe(rng, 0.35)
     return Bedding(
         fill_m=float(rng.uniform(*fills[fill])),
