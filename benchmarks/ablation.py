@@ -29,7 +29,7 @@ from golden import TABLE
 from processes import processes
 from rail_extract.core import pipeline
 from rail_extract.core.classify.flush import NO_LINES, Flush
-from rail_extract.core.polyline import length_along
+from rail_extract.core.polyline import Polyline
 from rail_extract.laboratory.ruler.golden import (
     PLACES,
     PLAIN,
@@ -74,11 +74,6 @@ def nothing(*_: Any) -> list:
     return []
 
 
-def never(*_: Any) -> bool:
-    """Return False."""
-    return False
-
-
 def none_of(values: Any, *_: Any) -> np.ndarray:
     """Choose none of the values."""
     return np.zeros(len(getattr(values, "axis", values)), dtype=bool)
@@ -109,7 +104,7 @@ SWITCHES = (
     _rule("vectorize.close", first),
     _rule("vectorize.junctions.drop_rungs", first),
     _rule("vectorize.junctions.drop_spurs", first),
-    _rule("lines.finishing.parts_without_turns", lambda line, *_: [(0.0, float(length_along(line)[-1]))]),
+    _rule("lines.finishing.parts_without_turns", lambda line, *_: [(0.0, Polyline(line).length_m)]),
     _rule("tracks.pairing._without_ghosts", list),
     _rule("tracks.pairing._without_rivals", lambda matches, misfits_m: list(matches)),
     _rule("tracks.pairing._on_one_level", lambda *_: True),
@@ -120,7 +115,7 @@ SWITCHES = (
     _rule("tracks.centerlines.started_abreast", lambda rails: list(rails)),
     _rule("tracks.centerlines.at_gauge", lambda left, right, *_: (left, right)),
     _rule("tracks.centerlines._smoothed", first),
-    _rule("tracks.centerlines.is_closed", never),
+    _rule("polyline.CLOSED_M", -1.0),
     _rule("tracks.pairing.FINE_STEP_M", 0.5),
     _rule("tracks.pairing._is_nearest", lambda *_: True),
     _rule("tracks.pairing.WANDER_WEIGHT", 0.0),

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..polyline import length_along, runs
+from ..polyline import Polyline, runs
 from ..progress import SILENT, Progress
 from .course import smoothed
 from .follow import Reason, Window, follow, turned
@@ -97,7 +97,7 @@ def _rail(windows: Sequence[Window], is_other: bool, start: Start, settings: Gro
     chosen = slice(int(own[0]), int(own[-1]) + 1)
     xyz = np.array([window.other_xyz if is_other else window.xyz for window in windows[chosen]])
     is_seen = np.array([head is not None for head in heads[chosen]])
-    along_m = length_along(xyz[:, :2])
+    along_m = Polyline(xyz).t
     smooth = smoothed(xyz, along_m, start.beam.smooth_m, is_seen)
     return Rail(smooth, _bridged(is_seen, settings.parameters.max_outliers), start.beam)
 

@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 from ..classify.flush import BESIDE_M, HEAD_LEVEL_M
 from ..classify.sharpness import is_blunt, is_decided
 from ..classify.square import classify_square
-from ..polyline import Feet, length_along, project
+from ..polyline import Feet, Polyline
 from ..rails import SearchFigures
 from .settings import BLUNT, DENSE, THIN, Beam, GrowSettings
 
@@ -67,7 +67,7 @@ class Rail:
     @property
     def length_m(self) -> float:
         """Length in plan."""
-        return float(length_along(self.xyz[:, :2])[-1])
+        return Polyline(self.xyz).length_m
 
 
 def heads_in(
@@ -167,11 +167,11 @@ class OnHeads:
 
     def _along(self, rail: Rail, xyz: np.ndarray) -> Feet:
         """Project points, (n, 3), in the user's strip onto a rail."""
-        return project([rail.xyz[:, :2]], xyz[:, :2], self._settings.parameters.thickness_m / 2 + rail.beam.widen_m)
+        return Polyline(rail.xyz).feet(xyz[:, :2], self._settings.parameters.thickness_m / 2 + rail.beam.widen_m)
 
     def _level_with(self, rail: Rail, xyz: np.ndarray, square: _Square) -> np.ndarray:
         """Return the numbers of the points, (n, 3), in the height of a rail; beside it, a pavement is as high."""
-        along_m = length_along(rail.xyz[:, :2])
+        along_m = Polyline(rail.xyz).t
         borders = (along_m[1:] + along_m[:-1]) / 2
         paved = np.zeros(len(along_m), dtype=bool)
         paved[np.searchsorted(borders, self._along(rail, square.xyz[square.paved]).t)] = True

@@ -20,7 +20,7 @@ from ..errors import OffCloudError, OffRailError
 from ..grow.growth import Growth, Stop, grow
 from ..grow.heads import OnHeads
 from ..grow.settings import GrowSettings
-from ..polyline import length_along, resample
+from ..polyline import Polyline
 from ..progress import SILENT, Progress
 from ..rails import SearchFigures
 from ..raster import BORDER_CELLS, cell_size
@@ -123,7 +123,7 @@ def grow_all(
     """
     reading, growing = progress.divide((1.0, 1.0))
     local = [request.zero.to_local(np.column_stack([seed[:, :2], np.zeros(len(seed))]))[:, :2] for seed in seeds]
-    places = [resample(seed, LINE_STEP_M)[0] if len(seed) > 1 else seed for seed in local]
+    places = [Polyline(seed).resampled(LINE_STEP_M).xyz if len(seed) > 1 else seed for seed in local]
     _check_seeds(request, np.concatenate(places))
     request.announce(progress)
     cloud = Cloud(request, np.concatenate(places), settings, folder, reading)
@@ -212,7 +212,7 @@ def _lengths(growths: Sequence[Growth]) -> SearchFigures:
         for rail in growth.rails:
             xy = rail.xyz[:, :2]
             new = np.isinf(cKDTree(known).query(xy, distance_upper_bound=SAME_M)[0]) if len(known) else True
-            length_m = float((np.gradient(length_along(xy)) * new * rail.seen).sum())
+            length_m = float((np.gradient(Polyline(xy).t) * new * rail.seen).sum())
             if len(growth.rails) > 1:
                 paired_m += length_m
             else:

@@ -22,7 +22,7 @@ from ..alignment.elements import Alignment, CantElement, Element, VerticalElemen
 from ..clouds.crs import parse_crs
 from ..fields import Field
 from ..frame import LocalFrame
-from ..polyline import length_along
+from ..polyline import Polyline
 from ..progress import SILENT, Progress
 
 VERTICES = "_points.csv"
@@ -131,7 +131,7 @@ def _vertex_rows(
     kept = [number for number, field in enumerate(fields) if not is_line or field.name in ID_FIELDS]
     yield [*(fields[number].name for number in kept), "x", "y", "z", *(["chainage_m"] if is_line else [])]
     for shape in shapes:
-        along = length_along(shape.xyz[:, :2]) * frame.horizontal_unit_m
+        along = Polyline(shape.xyz).t * frame.horizontal_unit_m
         for place, t in zip(shape.xyz, along):
             row = [*(shape.values[number] for number in kept), *_written(place)]
             yield [*row, f"{t:.3f}"] if is_line else row

@@ -21,7 +21,7 @@ from ...core.comparison.pieces import cut
 from ...core.errors import RailExtractError
 from ...core.parameters import Parameters
 from ...core.pipeline import extract_files
-from ...core.polyline import Chords, resample
+from ...core.polyline import Chords, Polyline
 from ...core.rails import RailNetwork
 from ...core.report import Finding, list_findings
 from ...core.report.findings import examine
@@ -210,7 +210,8 @@ def _blur_m(world: World) -> float:
 
 def _per_m(rail: np.ndarray, tree: cKDTree, half_m: float, bins: int) -> np.ndarray:
     """Count the points of a head in each section of `BIN_M` along its rail, (bins,), per metre."""
-    places, at = resample(rail, half_m / 2)
+    line = Polyline(rail).resampled(half_m / 2)
+    places, at = line.xyz, line.t
     near = tree.query_ball_point(places[:, :2], half_m)
     number = np.concatenate([np.asarray(one, dtype=np.int64) for one in near]) if len(near) else np.empty(0, np.int64)
     place = np.repeat(np.arange(len(places)), [len(one) for one in near])
@@ -232,7 +233,7 @@ def judge(world: World, network: RailNetwork) -> Judged:
     findings = list_findings(network, gauges_m) if network.centerlines else ()
     good = bool(network.centerlines) and verdict(examine(network, gauges_m))[0] == "good"
     at_findings = [
-        resample(np.atleast_2d(one.xyz), 1.0)[0] if len(np.atleast_2d(one.xyz)) > 1 else np.atleast_2d(one.xyz)
+        Polyline(one.xyz).resampled(1.0).xyz if len(np.atleast_2d(one.xyz)) > 1 else np.atleast_2d(one.xyz)
         for one in findings
     ]
     words = [frame.to_local(network.frame.to_crs(place)) for place in at_findings]

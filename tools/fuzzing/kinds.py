@@ -225,7 +225,7 @@ def _read_names(path: Path) -> None:
         args = parse(["classify", f"@{path}", "--output", "out.laz"])
     except SystemExit as error:
         raise ParameterError("The arguments are refused.") from error
-    ask(args.tiles, [RAIL])
+    ask(args.INPUT, [RAIL])
 
 
 def _make_moving(folder: Path) -> list[Path]:
