@@ -25,9 +25,10 @@ from ..progress import SILENT, Progress
 from ..rails import SearchFigures
 from ..raster import BORDER_CELLS, cell_size
 from ..squares.grid import Key
+from ..squares.store import files_of, read_stored
 from ..tasks import InTurn, Runner
 from .files import Choice, Labels, Output, Result, write_labelled
-from .finding import box_of, files_of, read_square, sort_files
+from .finding import POINT, box_of, sort_files
 
 LINE_STEP_M = 20.0
 """Distance between the places of a line at which rails are looked for; those that a rail has reached are skipped."""
@@ -184,7 +185,7 @@ class Cloud:
 
     def read(self, key: Key) -> np.ndarray:
         """Return the points of a square and of its margin, (n,) `finding.POINT`."""
-        return read_square(files_of(key, self._sorted))
+        return read_stored(files_of(key, self._sorted), POINT)
 
 
 def _check_seeds(request: Request, places: np.ndarray) -> None:

@@ -137,11 +137,6 @@ def parts_without_turns(
     return sorted(kept)
 
 
-def turn_deg(line: np.ndarray) -> float:
-    """Return the largest angle by which a line, (n, 2), turns within `TURN_M`, degrees."""
-    return float(np.degrees(_turns(Polyline(line).resampled(STEP_M)).max()))
-
-
 def _turns(stations: Polyline) -> np.ndarray:
     """Return the range of the directions within `TURN_M` of line around each section between stations, radians."""
     ahead = np.diff(stations.xy, axis=0)

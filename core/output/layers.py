@@ -46,7 +46,6 @@ class Layer:
 
     Attributes
     ----------
-    product : Product
     columns : sequence of sequence
         Values of each field, one per feature.
     xyz : sequence of (n, 3), (n, 4) or (3,) array

@@ -149,13 +149,7 @@ def _ends(one: Element) -> tuple[str, str]:
 
 
 def draw_alignment(alignment: Alignment, found: Deviations) -> str:
-    """Return the diagram of a track as SVG, one picture for each kilometre.
-
-    Parameters
-    ----------
-    alignment : Alignment
-    found : Deviations
-    """
+    """Return the diagram of a track as SVG, one picture for each kilometre."""
     courses = list(_courses(alignment, found))
     length_m = alignment.s_to - alignment.s_from
     borders = np.linspace(alignment.s_from, alignment.s_to, max(int(np.ceil(length_m / ROW_M)), 1) + 1)

@@ -72,8 +72,6 @@ class Place:
 
     Attributes
     ----------
-    track_id : int
-    doubt : Doubt
     start_m, end_m : float
         Chainages.
     length_m : float
@@ -93,8 +91,6 @@ class TrackFindings:
 
     Attributes
     ----------
-    line : Centerline
-    geometry : TrackGeometry
     nominal_mm : float
         Nearest of the gauges that tracks may have.
     doubtful : dict of Doubt to (n,) bool array
@@ -137,7 +133,6 @@ class Hole:
     ----------
     first, second : int
         Numbers of the tracks.
-    length_m : float
     ends : (2, 3) array
         Ends of the tracks, local metres.
     """

@@ -55,7 +55,6 @@ class Finding:
 
     Attributes
     ----------
-    reason : str
     xyz : (n, 3) array
         The section in local metres.
     harm : float

@@ -17,7 +17,7 @@ from ..progress import SILENT, Progress
 from ..rails import RailLine
 from ..tasks import Context, Runner, Task
 from ..tracks.geometry import PROFILE_SIGMA_M
-from .grid import Key, PointSource, Square, lay_out, unique_keys
+from .grid import Key, PointSource, Square, Tiling, lay_out
 
 CONTEXT_M = 10.0
 """Distance beyond a square over which its rails are measured as well: the disc reaches 1 m, and what is further away
@@ -129,7 +129,7 @@ def _sections(
         if whole is not None:
             sections[whole].append((number, 0.0, float(t[-1])))
             continue
-        keys, index = unique_keys(stations.xy - zero[:2], source.side_m)
+        keys, index = Tiling(source.side_m).keys(stations.xy - zero[:2])
         for place, key in enumerate(keys):
             for first, last in runs(index == place):
                 start = 0.0 if first == 0 else 0.5 * (t[first - 1] + t[first])

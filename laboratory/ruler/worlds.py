@@ -200,7 +200,18 @@ def to_be_found(world: World, pieces: Chords) -> np.ndarray:
         if seen.any():
             first, last = pieces.middle_t[mine][seen][[0, -1]]
             shown[mine] = seen & (pieces.middle_t[mine] > first + END_M) & (pieces.middle_t[mine] < last - END_M)
-    return shown
+    return shown & ~_is_flat(world, pieces)
+
+
+def _is_flat(world: World, pieces: Chords) -> np.ndarray:
+    """Return where a raw cloud from above shows no rail, (n,) bool: its beams and its blur are as wide as a groove.
+
+    Nothing else tells a head from the pavement around it.
+    """
+    paved_m = world.surroundings.paved_m
+    if paved_m is None or world.classified is not None or not world.survey.from_above:
+        return np.zeros(len(pieces.middle_t), dtype=bool)
+    return (pieces.middle_t > paved_m[0] - END_M) & (pieces.middle_t < paved_m[1] + END_M)
 
 
 def _blur_m(world: World) -> float:

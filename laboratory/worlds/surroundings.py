@@ -76,6 +76,8 @@ class Surroundings:
     half_width_m : float
     rise : callable
         Height of the ground above the tops of the rails, metres, by the place to the left of the reference line.
+    paved_m : tuple of float or None
+        Section along the reference line, metres, in which rails are in a pavement.
     """
 
     bed: str
@@ -85,16 +87,14 @@ class Surroundings:
     names: tuple[str, ...]
     half_width_m: float
     rise: Callable[[float], float]
+    paved_m: tuple[float, float] | None = None
 
 
 def draw_surroundings(seed: int, railway: Railway, survey: str) -> Surroundings:
-    """Draw what the tracks of a world lie in, so that a kind of survey shows them.
-
-    Blurred images show nothing of rails that lie level with a road or with their ballast.
-    """
+    """Draw what the tracks of a world lie in: no tunnel seen from above, no rails in images level with ballast."""
     rng = stream(seed, "surroundings")
     bed = chosen(rng, BEDS[railway.family])
-    if bed == STREET and (survey == IMAGES or not railway.plain):
+    if bed == STREET and not railway.plain:
         bed = BALLAST
     land = chosen(rng, LANDS[railway.family])
     if (land in (TUNNEL, BRIDGE) and not railway.plain) or (land == TUNNEL and survey in FROM_ABOVE) or bed == STREET:
@@ -103,14 +103,13 @@ def draw_surroundings(seed: int, railway: Railway, survey: str) -> Surroundings:
     half_width_m = _half_width(rng, railway)
     built = _Built(rng, railway, bedding, half_width_m)
     crossing = _crossing(rng, railway, bed, land)
-    if survey == IMAGES:
-        crossing = None
     terrain = Terrain.drawn(rng, railway, land)
     base = _base(rng, railway, bed, terrain, crossing)
     _furnish(built, bed, land, crossing, survey)
     names = (*(["level crossing"] if crossing else []), *built.names)
     whole = _together(seed, railway, (*base, *built.things))
-    return Surroundings(bed, land, bedding, whole, names, half_width_m, terrain.rise)
+    paved_m = (0.0, railway.reference.length_m) if bed == STREET else crossing
+    return Surroundings(bed, land, bedding, whole, names, half_width_m, terrain.rise, paved_m)
 
 
 def _together(seed: int, railway: Railway, built: Sequence[Thing]) -> Thing:
