@@ -42,10 +42,12 @@ def _run(values: Values, progress: Progress) -> Result:
     from ..alignment.fit import fit_tracks
     from ..fields import DEVIATIONS
     from ..output.layers import elements_layer, stations_layer
+    from ..progress import Recording
     from ..report import build_alignment_page
     from .reading import read_elements, read_tracks
     from .result import Result
 
+    progress = Recording(progress)
     tracks, frame = read_tracks(values, "INPUT", progress.span(0, READING))
     held = read_elements(values, "FIXED", frame.crs_wkt) if values.filled("FIXED") else []
     settings = FitParameters(values["TOLERANCE"] / 1000.0, values["MIN_LENGTH"], values["TRANSITIONS"], values["ROUND"])
@@ -59,7 +61,7 @@ def _run(values: Values, progress: Progress) -> Result:
             "ELEMENTS": lambda: elements_layer(alignments, progress),
             "DEVIATIONS": lambda: stations_layer(DEVIATIONS, deviations),
         },
-        {"REPORT": lambda: build_alignment_page(courses, values.title("INPUT"), facts, True)},
+        {"REPORT": lambda: build_alignment_page(courses, values.title("INPUT"), facts, True, progress.warnings)},
         tuple(
             f"Track {one.alignment.track_id}: {len(one.alignment.elements)} elements, root mean square "
             f"{one.rms_mm:.2f} mm"
