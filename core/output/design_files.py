@@ -57,7 +57,7 @@ def check_designs(alignments: Sequence[Alignment], progress: Progress) -> None:
             "system in metres."
         )
     for alignment in progress.follow(alignments):
-        check_joined(alignment)
+        check_joined(alignment, progress)
         if alignment.cant and not alignment.vertical:
             progress.warning(f"Track {alignment.track_id} has cant but no profile: IFC files leave the cant out.")
 

@@ -105,8 +105,9 @@ class RailAlgorithm(QgsProcessingAlgorithm):
     def _check(self, parameters: dict[str, Any], context: QgsProcessingContext) -> tuple[bool, str]:
         """Check as QGIS does, then that the outputs can be written, then as `read` does."""
         accepted, message = super().checkParameterValues(parameters, context)
-        if not accepted:
-            return False, self._refusal(parameters, context) or message
+        refusal = self._refusal(parameters, context)
+        if refusal or not accepted:
+            return False, refusal or message
         accepted, message = self.canExecute()
         if not accepted:
             return False, message

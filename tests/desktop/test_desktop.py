@@ -319,9 +319,7 @@ def test_the_standard_of_the_sample_is_not_that_of_the_user(run_scenario):
 def test_saved_layers_are_those_of_the_file(run_scenario):
     session = run_scenario("onwards")
     said, *files = session["saved"]
-    assert said.endswith(
-        "run.gpkg, with the report in run report.html. The layers of the project are now those of this file."
-    )
+    assert said == "Saved run.gpkg and run report.html. The project uses this file from now on."
     assert files == ["run report.html", "run.gpkg"]
     assert session["sources"] == ["run.gpkg"]
     assert session["decided"] == ["rejected", ""]
