@@ -10,11 +10,12 @@
 from typing import TYPE_CHECKING, Any
 
 from .core import VERSION as __version__  # noqa: N811 - the name that packages give it
+from .core.jobs import CALLS
 
 if TYPE_CHECKING:
-    from .core.front import Network, classify, extract
+    from .core.front import Network, extract
 
-__all__ = ["Network", "__version__", "classify", "extract"]
+__all__ = ["Network", "__version__", "extract", *CALLS]  # noqa: PLE0604
 
 
 def __getattr__(name: str) -> Any:

@@ -9,27 +9,23 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from .core.jobs import CALLS
+
 PROGRAM = "python -m rail_extract"
 
-LINES, POINTS = "core.commands.lines", "core.commands.points"
+JOB = "core.commands.jobs"
 
 COMMANDS = {
     "extract": ("core.commands.extract.extract", "extract rails and track centerlines on several cores or computers"),
-    "classify": (f"{POINTS}.classify", "find the rail points of raw clouds and write classified copies"),
-    "grow": (f"{POINTS}.grow", "follow rails from seeds and write classified copies of the clouds"),
-    "airborne": ("core.commands.airborne.airborne", "fit track centerlines in airborne clouds along guides"),
-    "fit": (f"{LINES}.fit", "fit design elements to track centerlines"),
-    "export-alignment": (f"{LINES}.export_alignment", "write design elements as LandXML, IFC or DXF"),
-    "import-alignment": (f"{LINES}.import_alignment", "read LandXML as elements and axes; compare tracks with it"),
-    "compare": (f"{LINES}.compare", "compare the lines of two surveys, or of a survey and a design"),
-    "stations": (f"{LINES}.stations", "give features their kilometre along an axis"),
-    "train-classifier": (f"{POINTS}.train_classifier", "train a classifier of rail points on labelled clouds"),
+    **{name.replace("_", "-"): (f"{JOB}.{name}", job.summary) for name, job in CALLS.items()},
+    "stations": ("core.commands.lines.stations", "give features their kilometre along an axis"),
     "onnx": ("core.frpdf.onnx.add_arguments", "write the network for other runtimes"),
     "train": ("laboratory.training.train.add_arguments", "train the network on synthetic rasters"),
     "evaluate": ("laboratory.training.evaluate.add_arguments", "compare weights on a fixed set of synthetic rasters"),
     "scenes": ("laboratory.scenes.write.add_arguments", "write synthetic clouds with their true lines"),
 }
-"""Function and help of each command; the function declares the arguments, and as `run` what runs with them.
+"""Function and help of each command; the function declares the arguments, and as `run` what runs with them. Those of
+the jobs have the names of the functions of Python.
 
 `run(args)` may return an exit code, and raises a `RailExtractError` where something is wrong.
 """

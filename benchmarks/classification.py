@@ -95,9 +95,9 @@ def measure_large(millions: float, seed: int) -> None:
 
 
 STAGES = (
-    (finding, "read_points", "reading and decompressing"),
+    (finding, "read_stored", "reading and decompressing"),
     (finding, "_sort_file", "sorting into squares on disk"),
-    (finding, "read_square", "reading the squares"),
+    (finding, "read_stored", "reading the squares"),
     (finding, "search_square", "joining the steps of the search"),
     (square.Bed, "under", "1 bed"),
     (square.Grid, "around", "2 tops"),

@@ -15,7 +15,7 @@ import numpy as np
 from rail_extract.core.grow.growth import Growth, grow
 from rail_extract.core.grow.heads import Rail
 from rail_extract.core.grow.settings import GrowSettings
-from rail_extract.core.polyline import interpolate, length_along, project
+from rail_extract.core.polyline import Polyline, project
 from rail_extract.laboratory.ruler.classification import truth
 from rail_extract.laboratory.ruler.lines import cut
 from rail_extract.laboratory.ruler.whole_clouds import GrowingCloud
@@ -81,7 +81,7 @@ def measured(scene: RawScene, wide: bool) -> Row:
     for rail, growth, seconds in clicked(scene, points):
         row.rails += 1
         row.seconds += seconds
-        row.true_m += float(length_along(rail[:, :2])[-1])
+        row.true_m += Polyline(rail).length_m
         if growth is None:
             continue
         row.found += 1
@@ -97,7 +97,7 @@ def measured(scene: RawScene, wide: bool) -> Row:
             step = grown.xyz - cut(scene.shown).nearest(grown.xyz)[0]
             across = np.hypot(step[:, 0], step[:, 1])
             near = across <= RIGHT_M
-            share_m = np.gradient(length_along(grown.xyz[:, :2]))
+            share_m = np.gradient(Polyline(grown.xyz).t)
             row.false_m += float(share_m[~near].sum())
             row.followed_m += float(share_m[near].sum()) if number == 0 else 0.0
             row.across_m2 += float((across[near] ** 2).sum())
@@ -123,8 +123,8 @@ def clicked(scene: RawScene, points: GrowingCloud) -> Iterator[tuple[np.ndarray,
 
 def _seen_middle(rail: np.ndarray, scene: RawScene) -> np.ndarray:
     """Return the place on a rail, (2,), with points of its head that is nearest to its middle."""
-    along = length_along(rail[:, :2])
-    places = interpolate(rail, along, np.linspace(0.0, along[-1], 101))
+    line = Polyline(rail)
+    places = line.at(np.linspace(0.0, line.length_m, 101))
     distance, _ = cKDTree(scene.xyz[scene.head]).query(places)
     seen = places[distance <= SEEN_M, :2]
     return seen[np.argmin(np.hypot(*(seen - places[50, :2]).T))]

@@ -23,7 +23,7 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 
-from rail_extract.core.polyline import interpolate, length_along
+from rail_extract.core.polyline import Polyline
 from rail_extract.laboratory.scenes.raw_catalogue import RAW_SCENES
 from rail_extract.laboratory.scenes.write import write_raw
 from scaling import lay_track
@@ -83,7 +83,7 @@ def _raw(folder: Path) -> list[str]:
 
 def _seeds(scene) -> dict:
     """Return a layer with the middle of each rail of a scene."""
-    middles = [interpolate(rail, along := length_along(rail[:, :2]), along[-1:] / 2)[0] for rail in scene.rails]
+    middles = [line.resampled(line.length_m / 2).xyz[1] for line in map(Polyline, scene.rails)]
     places = scene.frame.to_crs(middles).tolist()
     features = [
         {"type": "Feature", "properties": {}, "geometry": {"type": "Point", "coordinates": place[:2]}}

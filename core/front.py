@@ -5,26 +5,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field, fields
 from importlib import import_module
+from inspect import Parameter, Signature
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
-from .classify.settings import Settings
 from .clouds.points import ask
 from .clouds.readers import Extent, Paths, paths_of
+from .commands.files import run_with_files
 from .disk import Destination
 from .errors import ParameterError
-from .labelling.files import Choice, classify_files, plan_output
+from .jobs import CALLS
+from .jobs.declaration import Job
+from .jobs.result import Result
 from .parameters import DEFAULT_STEP_M, Parameters
 from .pipeline import extract_files
 from .progress import SILENT, Progress
-from .rails import RailNetwork, SearchFigures
+from .rails import RailNetwork
 from .report import Origin
-from .scratch import scratch_folder
 from .standards import DEFAULT, RAIL_CLASS, SEARCHED_CLASSES, resolve
 from .workers.runner import workers as workers_of
 
@@ -186,50 +188,38 @@ def extract(
     return Network(**vars(found), origin=Origin(paths, profile, settings.gauges[1:], command, settings))
 
 
-def classify(
-    clouds: Paths,
-    output: str | Path,
-    standard: str = DEFAULT,
-    *,
-    rail_class: int = RAIL_CLASS,
-    crs: str | None = None,
-    workers: int = 1,
-    progress: Progress = SILENT,
-) -> SearchFigures:
-    """Find the rail points of raw clouds, and write a copy of the clouds in which they have the rail class.
+def __getattr__(name: str) -> Callable[..., Result]:
+    """Return a job as a function."""
+    if name not in CALLS:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return function_of(CALLS[name])
 
-    Parameters
-    ----------
-    clouds : path or sequence of paths
-    output : path
-        LAZ or LAS file; for several tiles, the .vpc file beside the folder of the new tiles.
-    standard : str
-        Name of a rail standard.
-    rail_class : int
-        Class that the rail points get.
-    crs : str, optional
-        Coordinate system of files that state none.
-    workers : int
-        Processes that compute; 0 is one per core, as far as memory allows.
-    progress : Progress
 
-    Returns
-    -------
-    SearchFigures
-        How much was found.
+def function_of(job: Job) -> Callable[..., Result]:
+    """Return a job as a function whose arguments have the names of its parameters and outputs, in small letters.
 
-    Raises
-    ------
-    RailExtractError
-        A cloud can't be read, or the copy can't be written.
+    What must be given comes first; files of outputs may be left out, because the result writes them as well.
     """
-    profile = resolve(standard)
-    paths = paths_of(clouds)
-    planned = plan_output(paths, Path(output), rail_class, progress)
-    request = ask(paths, SEARCHED_CLASSES, crs, None, progress)
-    settings = Settings((profile.gauge_m,), profile.head_width_m)
-    with scratch_folder(planned.file.parent) as folder, workers_of(workers) as runner:
-        return classify_files(request, settings, Choice(rail_class), planned, folder, runner, progress).figures
+    stated = sorted((*job.parameters, *job.outputs), key=lambda one: not one.required)
+
+    def call(*args: Any, **given: Any) -> Result:
+        values = signature.bind(*args, **given).arguments
+        progress = values.pop("progress", SILENT)
+        plain = {name: str(value) if isinstance(value, Path) else value for name, value in values.items()}
+        command = f"rail_extract.{job.call}({', '.join(f'{name}={value!r}' for name, value in plain.items())})"
+        named = {name.upper(): value for name, value in values.items()}
+        return run_with_files(job, named, command, progress, lambda one: one.name.lower(), keeps=True)
+
+    first, later = Parameter.POSITIONAL_OR_KEYWORD, Parameter.KEYWORD_ONLY
+    arguments = [
+        Parameter(one.name.lower(), first) if one.required else Parameter(one.name.lower(), later, default=one.default)
+        for one in stated
+    ]
+    signature = Signature([*arguments, Parameter("progress", later, default=SILENT)], return_annotation=Result)
+    texts = [f"{one.name.lower()}\n    {one.label}. {one.help}" for one in stated]
+    call.__name__, call.__signature__ = job.call, signature  # type: ignore[attr-defined]
+    call.__doc__ = "\n".join([job.summary, "", job.help, "", "Parameters", "----------", *texts])
+    return call
 
 
 def _package(name: str) -> ModuleType:

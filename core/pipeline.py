@@ -14,7 +14,7 @@ import numpy as np
 
 from .checks.doubts import doubting_jumps, doubting_scatter, gauge_scatter, strip_courses, warn_of_strips
 from .checks.lines import warn_of_rails, warn_of_split_classes, with_tracks
-from .checks.standard import head_widths, warn_of_gauge, warn_of_spacing
+from .checks.standard import head_widths, warn_of_gauge, warn_of_raw, warn_of_spacing
 from .classify.settings import Settings
 from .clouds.las import CloudHeader
 from .clouds.points import RailPoints, Request, read_each
@@ -25,7 +25,7 @@ from .heads.strips import rows_of
 from .labelling.spooling import spool_found, spool_grown
 from .parameters import ALIGNED, Parameters
 from .progress import SILENT, Progress, Recording, counted
-from .rails import Centerline, RailLine, RailNetwork, TrackGeometry
+from .rails import Centerline, RailLine, RailNetwork, SearchFigures, TrackGeometry
 from .raster import RailRaster
 from .scratch import scratch_folder
 from .squares.density import occupied_squares, plausible, warn_of_airborne, warn_of_unexplained
@@ -147,14 +147,15 @@ def extract_files(
     first = FINDING if classify or len(seeds) else READING
     reading, rest = progress.divide((first, DRAWING + PAIRING + MEASURING))
     if classify or len(seeds):
+        is_warned = False
         with scratch_folder(folder) as scratch:
             if classify:
                 settings = Settings(parameters.gauges_m, parameters.head_width_m, weights=weights)
-                source, figures = spool_found(request, settings, side_m, scratch, runner, reading)
+                source, figures, is_warned = _found(request, settings, parameters, scratch, runner, reading)
             else:
                 own = GrowSettings(parameters.gauge_m, parameters.head_width_m)
                 source, figures = spool_grown(request, seeds, own, side_m, scratch, reading)
-            network = _walk([source], parameters, runner, rest, raw=True)
+            network = _walk([source], parameters, runner, rest, is_warned, raw=True)
         if classify and network.heads is not None and network.heads.blunt:
             # Only its partner tells a blunt rail from other ridges, and the user has been told so.
             network = replace(network, rails=tuple(rail for rail in network.rails if rail.track_ids))
@@ -163,6 +164,18 @@ def extract_files(
     request.announce(progress)
     network = _walk(_sorted_points(request, side_m, folder, runner, reading), parameters, runner, rest, is_warned)
     return replace(network, warnings=recording.warnings)
+
+
+def _found(
+    request: Request, settings: Settings, parameters: Parameters, folder: Path, runner: Runner, progress: Progress
+) -> tuple[SpooledPoints, SearchFigures, bool]:
+    """Find the rail points of a raw cloud; returns them, figures, and whether the user is warned of another gauge."""
+    try:
+        source, figures = spool_found(request, settings, square_side(parameters), folder, runner, progress)
+    except NoRailPointsError:
+        warn_of_raw(request, SearchFigures(), parameters, progress)
+        raise
+    return source, figures, warn_of_raw(request, figures, parameters, progress)
 
 
 def _sorted_points(

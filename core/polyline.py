@@ -77,6 +77,10 @@ class Polyline:
     xyz: np.ndarray
     given: np.ndarray | None = None
 
+    def __reduce__(self) -> tuple[type[Polyline], tuple[np.ndarray, np.ndarray | None]]:
+        """Send to another process what the rest follows from."""
+        return Polyline, (self.xyz, self.given)
+
     @property
     def xy(self) -> np.ndarray:
         """Vertices in plan, (n, 2)."""
@@ -167,37 +171,6 @@ class Polyline:
     @cached_property
     def _chords(self) -> Chords:
         return Chords.of([Polyline(self.xy)], STATION_M)
-
-
-def resample(vertices: np.ndarray, step_m: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return stations along a polyline and their chainages; see `Polyline.resampled`."""
-    line = Polyline(vertices).resampled(step_m)
-    return line.xyz, line.t
-
-
-def is_closed(line: np.ndarray) -> bool:
-    """Return `Polyline.is_closed`."""
-    return Polyline(line).is_closed
-
-
-def part(vertices: np.ndarray, start: float, end: float) -> np.ndarray:
-    """Return the vertices of `Polyline.part`."""
-    return Polyline(vertices).part(start, end).xyz
-
-
-def unit_tangents(vertices: np.ndarray) -> np.ndarray:
-    """Return `Polyline.tangents`."""
-    return Polyline(vertices).tangents
-
-
-def left_normals(vertices: np.ndarray) -> np.ndarray:
-    """Return `Polyline.normals`."""
-    return Polyline(vertices).normals
-
-
-def starts_at_its_end(vertices: np.ndarray) -> bool:
-    """Return `Polyline.starts_at_its_end`."""
-    return Polyline(vertices).starts_at_its_end
 
 
 def interpolate(values: np.ndarray, along: np.ndarray, t: np.ndarray) -> np.ndarray:

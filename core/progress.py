@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from itertools import accumulate
@@ -14,6 +13,14 @@ Item = TypeVar("Item")
 
 REPORT_EVERY_S = 5.0
 """Interval between reports of the remaining time, and run time before the first."""
+
+LEAST_DONE = 0.05
+"""Fraction that must be done by an activity before its speed says anything: what comes first, such as the start of
+processes or a dense square, took a thousandth of a run and a tenth of its time."""
+
+SURE_FACTOR = 2.0
+"""Factor by which the speed may differ between the third and the last quarter of an activity; where it differs more,
+the remaining time is not known."""
 
 LEAST_LEFT_S = 10.0
 """Remaining time below which none is reported: the estimate would be gone before it is read."""
@@ -154,7 +161,7 @@ class Estimating(_Relay):
     """Passes everything on, and reports the remaining time, estimated from the second half of the elapsed time.
 
     A status begins an activity with a speed of its own: the time before it, such as that of an import, does not count.
-    While files are read, nothing is estimated.
+    Nothing is reported while files are read, and until the time is known to a factor of two.
 
     Parameters
     ----------
@@ -169,7 +176,7 @@ class Estimating(_Relay):
         self._clock = clock
         self._marks = [(clock(), 0.0)]
         self._is_reading = False
-        self._fraction, self._reported = 0.0, -math.inf
+        self._fraction = 0.0
 
     def status(self, text: str) -> None:
         """Pass the activity on, and measure its speed from here."""
@@ -185,18 +192,31 @@ class Estimating(_Relay):
         """Pass the fraction on, and every few seconds report the remaining time as status."""
         super().set_fraction(fraction)
         self._fraction = fraction
-        now, start = self._clock(), self._marks[0][0]
-        if self._is_reading or now - self._reported < REPORT_EVERY_S or now - start < REPORT_EVERY_S:
+        now = self._clock()
+        if self._is_reading or now - self._marks[-1][0] < REPORT_EVERY_S:
             return
-        self._reported = now
         self._marks.append((now, fraction))
-        half = next(mark for mark in self._marks if mark[0] >= start + (now - start) / 2)
-        before = half if half[0] < now else self._marks[0]
-        if before[1] < fraction < 1.0:
-            left_s = (1.0 - fraction) * (now - before[0]) / (fraction - before[1])
-            if left_s < LEAST_LEFT_S:
-                return
+        left_s = self._left_s()
+        if left_s is not None and left_s >= LEAST_LEFT_S:
             super().status(f"{100 * fraction:.0f} % done, about {_rounded(left_s)} left")
+
+    def _left_s(self) -> float | None:
+        """Estimate the remaining time from what is done since the activity began; None where it is not known."""
+        (start, before), (now, fraction) = self._marks[0], self._marks[-1]
+        if fraction - before < LEAST_DONE or fraction >= 1.0:
+            return None
+        quarter_s = (now - start) / 4
+        half, last = (self._fraction_at(start + number * quarter_s) for number in (2, 3))
+        slower, faster = sorted((last - half, fraction - last))
+        if slower <= 0 or faster > SURE_FACTOR * slower:
+            return None
+        return (1.0 - fraction) * 2 * quarter_s / (fraction - half)
+
+    def _fraction_at(self, moment: float) -> float:
+        """Return what was done at a moment of the activity, by the marks around it."""
+        number = next(number for number, (at, _) in enumerate(self._marks) if at >= moment)
+        (before, done), (after, more) = self._marks[number - 1], self._marks[number]
+        return done + (more - done) * (moment - before) / (after - before)
 
 
 def _rounded(seconds: float) -> str:
@@ -218,3 +238,21 @@ def counted(count: int, one: str, many: str = "") -> str:
 
 
 SILENT = Progress()
+
+
+class Until(_Relay):
+    """Cancels after a time.
+
+    Parameters
+    ----------
+    listener : Progress
+    limit_s : float
+    """
+
+    def __init__(self, listener: Progress, limit_s: float) -> None:
+        super().__init__(listener)
+        self._end = time.monotonic() + limit_s
+
+    def is_cancelled(self) -> bool:
+        """Return whether the time is over, or the user has cancelled the run."""
+        return super().is_cancelled() or time.monotonic() > self._end

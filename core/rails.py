@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import astuple, dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
 from .frame import LocalFrame
-from .polyline import length_along, part
+from .polyline import Polyline, length_along
 from .raster import RailRaster
 
 NO_GAPS = np.empty((0, 2))
@@ -133,6 +134,11 @@ class RailLine:
         """Length in 3D; in plan if the line has no heights."""
         return _length(self.xyz)
 
+    @cached_property
+    def line(self) -> Polyline:
+        """Line with its chainages in plan."""
+        return Polyline(self.xyz)
+
     @property
     def knows_gaps(self) -> bool:
         """Whether `gaps` are all sections without points; not of lines from files that say less."""
@@ -140,7 +146,7 @@ class RailLine:
 
     def bridged_before(self, t: np.ndarray) -> np.ndarray:
         """Return the length of gaps before chainages `t`, (n,) metres; everything beyond the line's ends is a gap."""
-        beyond = t - np.clip(t, 0.0, length_along(self.xyz[:, :2])[-1])
+        beyond = t - np.clip(t, 0.0, self.line.length_m)
         if not len(self.gaps):
             return beyond
         passed = np.cumsum(self.gaps[:, 1] - self.gaps[:, 0])
@@ -148,7 +154,7 @@ class RailLine:
 
     def between(self, start: float, end: float) -> RailLine:
         """Return the part between two plan chainages, with the share of the points that its stations count."""
-        length_m = float(length_along(self.xyz[:, :2])[-1])
+        length_m = self.line.length_m
         if start <= 0.0 and end >= length_m:
             return self
         start, end = max(start, 0.0), min(end, length_m)
@@ -159,7 +165,7 @@ class RailLine:
             last = np.inf if end >= self.support.t[-1] else end
             support = self.support.select((self.support.t >= start) & (self.support.t < last), start)
             share = support.points.sum() / max(self.support.points.sum(), 1)
-        return replace(self, xyz=part(self.xyz, start, end), points=self.points * share, gaps=gaps, support=support)
+        return replace(self, xyz=self.line.part(start, end).xyz, points=self.points * share, gaps=gaps, support=support)
 
     def part(self, start: float, end: float) -> RailLine:
         """Return the part between two plan chainages as a rail of its own, with its own figures."""
@@ -171,7 +177,7 @@ class RailLine:
 
     def reversed(self) -> RailLine:
         """Return the line in the other direction."""
-        plan_length = length_along(self.xyz[:, :2])[-1]
+        plan_length = self.line.length_m
         support = None if self.support is None else self.support.reversed(plan_length)
         return replace(self, xyz=self.xyz[::-1], gaps=plan_length - self.gaps[::-1, ::-1], support=support)
 
@@ -211,10 +217,15 @@ class Centerline:
         """Length in 3D; in plan if the line has no heights."""
         return _length(self.xyz)
 
+    @cached_property
+    def line(self) -> Polyline:
+        """Line with its chainages in plan."""
+        return Polyline(self.xyz)
+
     def part(self, start: float, end: float) -> Centerline:
         """Return the part between two plan chainages, with the means of the whole line."""
-        share = (end - start) / length_along(self.xyz[:, :2])[-1]
-        return replace(self, xyz=part(self.xyz, start, end), bridged_m=self.bridged_m * share)
+        share = (end - start) / self.line.length_m
+        return replace(self, xyz=self.line.part(start, end).xyz, bridged_m=self.bridged_m * share)
 
 
 def cell_borders(chainage: np.ndarray) -> np.ndarray:

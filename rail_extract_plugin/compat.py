@@ -21,9 +21,6 @@ else:
 OPENS_3D_VIEWS = Qgis.QGIS_VERSION_INT >= 33600
 """Whether a plugin can open a 3D map view."""
 
-GROUPS_LAYERS = Qgis.QGIS_VERSION_INT >= 33200
-"""Whether results can be loaded into a group, in an order."""
-
 DIGITS = 20
 """Width of a number with decimals. Without a width, a shapefile field would have one digit; without decimals either, 15
 decimals."""

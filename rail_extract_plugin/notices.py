@@ -14,6 +14,9 @@ class _Notices(QObject):
     run_failed = pyqtSignal(object, object)
     """Feedback of a run, and the class of the error that ended it."""
 
+    run_left = pyqtSignal(object)
+    """Frame of the function in which a run failed."""
+
     standard_proposed = pyqtSignal(object, str)
     """Feedback of a run, and the name of a rail standard that fits the points better."""
 

@@ -14,3 +14,8 @@ SAMPLE = RESOURCES / "sample"
 STYLES = RESOURCES / "styles"
 PICTURES = RESOURCES / "help"
 GUIDE = RESOURCES / "guide"
+
+
+def is_sample(path: str) -> bool:
+    """Return whether a path is that of the sample cloud, which shows what the plugin does and is nobody's survey."""
+    return bool(path) and SAMPLE in Path(path).resolve().parents

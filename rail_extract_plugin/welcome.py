@@ -10,7 +10,7 @@ from qgis.PyQt import sip
 from qgis.PyQt.QtCore import QObject
 from qgis.PyQt.QtWidgets import QPushButton
 
-from .algorithms.extract_rails import ExtractRails
+from ..core.jobs.extract_rails import JOB
 from .notices import notices
 from .runs.missing import open_installation
 from .setup.dependencies import Package, missing_packages
@@ -41,7 +41,7 @@ class Welcome(QObject):
 
     def show(self) -> None:
         """Show the next step, unless it was the last one that was shown."""
-        missing = missing_packages(ExtractRails.NEEDS)
+        missing = missing_packages(JOB.needs)
         step = INSTALL if missing else SAMPLE
         if QgsSettings().value(SHOWN) == step:
             return

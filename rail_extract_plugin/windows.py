@@ -20,6 +20,7 @@ from .model_action import OpenModelAction
 from .notices import notices
 from .paths import ICON
 from .review.report import ReportOpener
+from .runs.leftovers import Leftovers
 from .runs.missing import open_installation
 from .runs.run_dialog import open_dialog
 from .sample_action import OpenSampleAction
@@ -58,6 +59,7 @@ class Windows(QObject):
         notices.sample_wanted.connect(self._open_sample)
         self._reports = ReportOpener()
         self._reports.register()
+        self._leftovers = Leftovers()
         links.register()
         self.dock: ReviewDock | None = None
         self.growing: GrowRails | None = None
@@ -127,10 +129,11 @@ class Windows(QObject):
         """Add the toolbar for growing rails, and return the menu entry that begins it."""
         from .growing.tool import GrowRails
 
-        self.growing = GrowRails(iface.mapCanvas(), iface.messageBar(), iface.activeLayer, iface.mainWindow())
+        self.growing = GrowRails(iface.mapCanvas(), iface.messageBar(), iface.mainWindow())
         self._toolbar = iface.addToolBar(MENU)
         self._toolbar.setObjectName("RailExtractGrowing")
         self._toolbar.addActions(self.growing.actions)
+        self._toolbar.addWidget(self.growing.clouds)
         self._toolbar.addWidget(self.growing.standards)
         return self.growing.grow_action
 
@@ -173,6 +176,7 @@ class Windows(QObject):
             self.growing = None
         notices.sample_wanted.disconnect(self._open_sample)
         self._reports.deregister()
+        self._leftovers.stop()
         links.deregister()
         package_setting.deregister()
         for action in self._actions:

@@ -35,9 +35,9 @@ from rail_extract.core.fields import (  # noqa: E402
     STOPS,
     Field,  # noqa: E402
 )
+from rail_extract.core.jobs.declaration import UNBOUNDED  # noqa: E402
 from rail_extract.core.standards import CUSTOM, SOURCES, STANDARDS  # noqa: E402
 from rail_extract.rail_extract_plugin.algorithms import ALGORITHMS  # noqa: E402
-from rail_extract.rail_extract_plugin.dialog.definitions import UNBOUNDED  # noqa: E402
 
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "reference.md"
 
@@ -69,7 +69,7 @@ LAYERS = {
 def page(provider: QgsProcessingProvider) -> str:
     """Return the page."""
     parts = [INTRODUCTION, "\n## Algorithms\n"]
-    for algorithm in (provider.algorithm(one.NAME) for one in ALGORITHMS):
+    for algorithm in (provider.algorithm(one.JOB.name) for one in ALGORITHMS):
         parts += [f"\n### {algorithm.displayName()}: `{algorithm.id()}`\n\n{algorithm.shortDescription()}\n"]
         parts += _table(("parameter", "in the dialog", "default", "values"), _inputs(algorithm))
         parts += _table(("output", "meaning"), _outputs(algorithm))

@@ -47,12 +47,12 @@ from qgis.PyQt.QtCore import QSize  # noqa: E402
 from qgis.PyQt.QtGui import QColor  # noqa: E402
 from qgis.PyQt.QtWidgets import QMainWindow, QWidget  # noqa: E402
 from rail_extract.core.frame import LocalFrame  # noqa: E402
+from rail_extract.core.jobs.clouds import CloudSource  # noqa: E402
 from rail_extract.core.standards import RAIL_CLASS, resolve  # noqa: E402
 from rail_extract.laboratory.scenes.raw_catalogue import turnout  # noqa: E402
 from rail_extract.laboratory.scenes.scene import Scene  # noqa: E402
 from rail_extract.laboratory.scenes.write import write_cloud  # noqa: E402
-from rail_extract.rail_extract_plugin.reading.clouds import CloudSource  # noqa: E402
-from rail_extract.rail_extract_plugin.writing.run import properties_of  # noqa: E402
+from rail_extract.rail_extract_plugin.writing.run import RUN, properties_of  # noqa: E402
 
 ROOT = Path(__file__).resolve().parents[1]
 SAMPLE = ROOT / "resources" / "sample" / "sample.laz"
@@ -222,7 +222,8 @@ def _review(path: Path, rails: QgsVectorLayer, picture: Path) -> None:
     """Draw the dock for reviews at the first finding."""
     from rail_extract.rail_extract_plugin.review.dock import ReviewDock
 
-    properties = properties_of(CloudSource((SAMPLE,)), (10,), resolve(STANDARD).head_width_m, LocalFrame(np.zeros(3)))
+    width_m, frame = resolve(STANDARD).head_width_m, LocalFrame(np.zeros(3))
+    properties = {RUN: "this run", **properties_of(CloudSource((SAMPLE,)), (10,), width_m, frame)}
     project, findings = QgsProject.instance(), _layer(path)
     for layer in (rails, findings):
         for name, value in properties.items():
@@ -260,7 +261,7 @@ def _growing(cloud: Path, picture: Path) -> None:
     canvas.setExtent(QgsRectangle.fromCenterAndSize(QgsPointXY(*middle), GROWN_M, height))
     canvas.setRotation(GROWN_TURN)
     canvas.show()
-    tool = GrowRails(canvas, bar, lambda: layer, window)
+    tool = GrowRails(canvas, bar, window)
     for place in ends:
         tool.click(QgsPointXY(*place[:2]))
         while tool.is_growing:

@@ -79,8 +79,9 @@ def look_beside(corridor: Corridor, shape: Shape, sections: int) -> Beside:
     width = 2 * half + 1
     bins = places + width - 1
     low_m = -(places // 2 + half + 0.5) * STEP_M
-    section = ((corridor.t - corridor.start_m) / STATION_M).astype(np.int64)
-    count, height = binned(section, corridor.across, corridor.height, sections, low_m, bins, STEP_M)
+    count, height = binned(
+        corridor.section_of(STATION_M), corridor.across, corridor.height, sections, low_m, bins, STEP_M
+    )
     total = _around(count * height)
     count = _around(count)
     height = total / np.maximum(count, 1)

@@ -65,6 +65,10 @@ class Corridor:
         """Chainage of the middle of each section, (k,)."""
         return self.start_m + (np.arange(self.sections) + 0.5) * SECTION_M
 
+    def section_of(self, length_m: float) -> np.ndarray:
+        """Return the section of a length in which each point lies, (n,); the first holds those before it as well."""
+        return ((self.t - self.start_m) / length_m).astype(np.int64)
+
     def level_at(self, t: np.ndarray) -> np.ndarray:
         """Return the level of the bed at chainages."""
         return np.interp(t, self.middles, self.level)
@@ -119,7 +123,7 @@ def _level(section: np.ndarray, across: np.ndarray, z: np.ndarray, count: int) -
 
 def _near_the_median(corridor: Corridor) -> np.ndarray:
     """Return which points lie near the median of their cell, (n,) bool."""
-    row = ((corridor.t - corridor.start_m) / CELL_M).astype(np.int64)
+    row = corridor.section_of(CELL_M)
     column = np.floor(corridor.across / CELL_ACROSS_M).astype(np.int64)
     cell = (row - row.min(initial=0)) * 4096 + column + 2048
     order = np.lexsort((corridor.height, cell))
@@ -136,7 +140,7 @@ def _levelled_strips(corridor: Corridor) -> Corridor:
     if len(strips) < 2:
         return corridor
     near = np.abs(corridor.across) < OWN_LEVEL_M
-    section = np.clip(((corridor.t - corridor.start_m) / SECTION_M).astype(np.int64), 0, corridor.sections - 1)
+    section = np.clip(corridor.section_of(SECTION_M), 0, corridor.sections - 1)
     means = np.array([_means(section, corridor.height, near & (corridor.strip == one), corridor) for one in strips])
     shared = np.isfinite(means).sum(axis=0) > 1
     if shared.sum() < MIN_SHARED:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
@@ -14,6 +13,7 @@ from ..frame import LocalFrame
 from ..parameters import AirborneParameters
 from ..polyline import Polyline
 from ..progress import Progress
+from ..squares.store import counts_of, files_of, read_stored
 from ..standards import STANDARDS
 from ..tasks import Context, Task
 from .axis import axis_of_guide
@@ -21,7 +21,7 @@ from .fitting import EMPTY, SEEN, Fitted, Stations, fit_tracks
 from .remarks import FLIGHT, are_hints, on_density, on_gauges, on_shapes, refuse_mobile
 from .run import Run
 from .sections import STATION_M
-from .spooling import density_of, points_of, spool
+from .spooling import POINT, density_of, spool
 from .squares import Key, Piece, pieces_by_square
 from .survey import AirborneTrack, Guide, Survey, joined_others, lines_of, track_of
 
@@ -58,19 +58,21 @@ def survey_files(run: Run, guides: Sequence[Guide]) -> Survey:
     reading, fitting = progress.divide((1.0, 2.0))
     progress.status("Reading the points along the guides")
     progress.reading()
-    counts = spool(replace(run, progress=reading), squares)
+    points = spool(replace(run, progress=reading), squares)
+    counts = counts_of(points)
     if not counts:
         raise NoRailPointsError(
             f"The cloud has no points of class {', '.join(map(str, request.class_codes))} along the guides: set the "
             "classes, and check the coordinate system of the guides."
         )
-    densities = [density_of(points_of(run.folder, key)["xyz"][:, :2]) for key in counts]
+    files = {key: files_of(key, points) for key in counts}
+    densities = [density_of(read_stored(own, POINT)["xyz"][:, :2]) for own in files.values()]
     density = float(np.median(np.concatenate(densities)))
     refuse_mobile(density)
     progress.info(f"The cloud has {density:.1f} points per square metre along the guides.")
     progress.status("Fitting the tracks")
     spacings_m = [parameters.spacing_of(guide.gauge_m) for guide in guides]
-    fitted = _fit(replace(run, progress=fitting), squares, counts, spacings_m)
+    fitted = _fit(replace(run, progress=fitting), squares, files, counts, spacings_m)
     frame = _frame(request.zero, axes)
     tracks = [
         _joined(guide, axis, parts, spacing_m, parameters.rail_height_m, request.zero, frame)
@@ -87,14 +89,18 @@ def survey_files(run: Run, guides: Sequence[Guide]) -> Survey:
 
 
 def _fit(
-    run: Run, squares: Mapping[Key, tuple[Piece, ...]], counts: Mapping[Key, int], spacings_m: Sequence[float]
+    run: Run,
+    squares: Mapping[Key, tuple[Piece, ...]],
+    files: Mapping[Key, list[str]],
+    counts: Mapping[Key, int],
+    spacings_m: Sequence[float],
 ) -> list[list[tuple[Piece, Fitted]]]:
     """Fit all squares that have points, and return what was found along each guide, piece by piece."""
     tasks: dict[Key, Task] = {
         key: Task(
             f"The square {key}",
             fit_square,
-            (run.folder, key, pieces, spacings_m, run.parameters),
+            (files[key], pieces, spacings_m, run.parameters),
             weight=FIT_S * counts[key],
         )
         for key, pieces in squares.items()
@@ -165,15 +171,14 @@ def _check_inside(request: Request, axes: Sequence[Polyline], reach_m: float) ->
 
 
 def fit_square(
-    folder: Path,
-    key: Key,
+    files: Sequence[str],
     pieces: Sequence[Piece],
     spacings_m: Sequence[float],
     parameters: AirborneParameters,
     context: Context,
 ) -> list[Fitted]:
     """Fit the pieces of guides in a square; their stations outside of it are dropped. A task."""
-    points = points_of(folder, key)
+    points = read_stored(files, POINT)
     origin = np.floor(points["xyz"].mean(axis=0))
     axes = [Polyline(piece.axis.xy - origin[:2], piece.axis.t) for piece in pieces]
     own = [spacings_m[piece.number] for piece in pieces]

@@ -127,7 +127,6 @@ class Fitted:
 
     Attributes
     ----------
-    stations : Stations
     shape : Shape or None
         Ridges as they were measured; None where no track was found.
     shown_m : float
@@ -167,7 +166,6 @@ def fit_tracks(
         Largest distance of a track from its guide.
     footprint_m : float
         Diameter of the beam on the ground.
-    progress : Progress
     """
     shapes = [Shape.expected(spacing_m, footprint_m) for spacing_m in spacings_m]
     looking, fitting = progress.divide((3.0, 2.0))

@@ -117,7 +117,6 @@ def certainty(course: Course, score: np.ndarray, across: np.ndarray) -> np.ndarr
 
     Parameters
     ----------
-    course : Course
     score : (sections, c) array
         Together with the neighbours.
     across : (c,) array

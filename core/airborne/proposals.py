@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -11,12 +11,12 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..clouds.points import Request
-from ..disk import writing
 from ..errors import NoRailPointsError, ParameterError
 from ..frame import LocalFrame
 from ..polyline import Polyline, runs
 from ..progress import counted
-from ..squares.grid import Key, points_by_square
+from ..squares.grid import Key, Tiling
+from ..squares.store import SortedFile, append, counts_of, files_of, read_stored
 from ..tasks import READ_S, Context, Task, in_listed_order
 from .chaining import MIN_LENGTH_M, chains
 from .files import survey_files
@@ -29,6 +29,9 @@ from .survey import AirborneTrack, Guide, Survey
 
 SIDE_M = 200.0
 """Side of the squares that are searched: with 40 points per square metre, the points of one take 30 MB."""
+
+TILING = Tiling(SIDE_M, TILE_M)
+"""Its margin is a tile: that of a find at the border reaches as far."""
 
 SEARCH_S = 3e-5
 """Run time of the search per point, in seconds."""
@@ -69,7 +72,6 @@ class Proposals:
     Attributes
     ----------
     guides : tuple of ProposedGuide
-    frame : LocalFrame
     density : float
         Points per square metre.
     """
@@ -117,9 +119,9 @@ def propose_guides(run: Run) -> Proposals:
     reading, searching, *fitting = run.progress.divide((2.0, 8.0, 1.0, 1.0))
     run.progress.status("Reading the points")
     run.progress.reading()
-    counts = _sorted(replace(run, progress=reading))
+    files = _sorted(replace(run, progress=reading))
     run.progress.status("Searching for tracks")
-    finds, density = _found(replace(run, progress=searching), counts)
+    finds, density = _found(replace(run, progress=searching), files)
     refuse_mobile(density)
     flat = [np.column_stack([line, np.zeros(len(line))]) for line in chains(finds)]
     if not flat:
@@ -159,47 +161,38 @@ def _is_new(xy: np.ndarray, known: list[np.ndarray]) -> bool:
     return bool(np.median(cKDTree(np.concatenate(known)).query(xy)[0]) > APART_M)
 
 
-def _sorted(run: Run) -> dict[Key, int]:
-    """Sort the points of all files into squares on disk, and return the number of points in each."""
+def _sorted(run: Run) -> list[SortedFile]:
+    """Sort the points of all files into squares on disk."""
     request, folder = run.request, run.folder
-    with writing(folder):
-        folder.mkdir(parents=True, exist_ok=True)
     tasks = {
         number: Task(header.path.name, sort_file, (request, number, folder), weight=READ_S * (header.point_count + 1))
         for number, header in enumerate(request.headers)
     }
-    counts: Counter[Key] = Counter()
-    for _, one in run.runner.run(tasks, run.progress):
-        counts.update(one)
-    if not counts:
+    found = [one for _, one in sorted(run.runner.run(tasks, run.progress), key=lambda pair: pair[0])]
+    if not any(one.counts for one in found):
         raise NoRailPointsError(
             f"The {request.where} has no points of class {', '.join(map(str, request.class_codes))}: set the classes."
         )
-    return dict(counts)
+    return found
 
 
-def sort_file(request: Request, number: int, folder: Path, context: Context) -> dict[Key, int]:
-    """Sort the points of a file into squares and their surroundings, and return the number in each; a task."""
-    counts: dict[Key, int] = {}
+def sort_file(request: Request, number: int, folder: Path, context: Context) -> SortedFile:
+    """Sort the points of a file into squares and their surroundings; a task."""
+    mine, counts = SortedFile.new_folder(folder), Counter[Key]()
     for xyz, _, _, _ in request.read(request.headers[number], context.progress):
         local = request.zero.to_local(xyz)
-        for key, chosen in points_by_square(local, SIDE_M, TILE_M).items():
-            counts[key] = counts.get(key, 0) + len(chosen)
-            corner = [*(np.array(key) * SIDE_M), 0.0]
-            with writing(folder), _file(folder, key, number).open("ab") as file:
-                file.write((local[chosen] - corner).astype("<f4").tobytes())
-    return counts
+        for key, chosen in TILING.sort(local).items():
+            counts[key] += len(chosen)
+            append(mine, key, (local[chosen] - [*(np.array(key) * SIDE_M), 0.0]).astype("<f4"))
+    return SortedFile(str(mine), counts)
 
 
-def _file(folder: Path, key: Key, number: int) -> Path:
-    return folder / f"{key[0]}_{key[1]}_{number}"
-
-
-def _found(run: Run, counts: Mapping[Key, int]) -> tuple[Finds, float]:
+def _found(run: Run, files: Sequence[SortedFile]) -> tuple[Finds, float]:
     """Search all squares, and return their finds and the median density."""
     shape = Shape.expected(run.parameters.spacing_of(), run.parameters.footprint_m)
+    counts = counts_of(files)
     tasks = {
-        key: Task(f"The square {key}", search_square, (run.folder, key, shape), weight=SEARCH_S * counts[key])
+        key: Task(f"The square {key}", search_square, (files_of(key, files), key, shape), weight=SEARCH_S * counts[key])
         for key in sorted(counts)
     }
     rows, densities = [], []
@@ -210,15 +203,14 @@ def _found(run: Run, counts: Mapping[Key, int]) -> tuple[Finds, float]:
 
 
 def search_square(
-    folder: Path, key: Key, shape: Shape, context: Context
+    files: Sequence[str], key: Key, shape: Shape, context: Context
 ) -> tuple[list[tuple[float, float, float, float]], float]:
     """Search a square, and return its finds and its points per square metre; a task."""
-    files = sorted(folder.glob(f"{key[0]}_{key[1]}_*"))
-    local = np.concatenate([np.fromfile(file, "<f4").reshape(-1, 3) for file in files]).astype(np.float64)
-    for file in files:
-        file.unlink()
+    local = read_stored(files, np.dtype("<f4")).reshape(-1, 3).astype(np.float64)
     corner = np.array(key) * SIDE_M
     found = search(local, np.zeros(2), SIDE_M, shape, context.progress)
+    for file in files:
+        Path(file).unlink(missing_ok=True)
     moved = [(x + corner[0], y + corner[1], direction, score) for x, y, direction, score in found]
     return moved, float(np.median(density_of(local[:, :2])))
 

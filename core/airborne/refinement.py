@@ -38,7 +38,6 @@ class Traced:
     ----------
     points : Points
         Around the guide.
-    guide : Polyline
     across : (sections,) array
         Course of the track, see `course.Course`.
     shape : Shape
@@ -59,12 +58,10 @@ class Seen:
     ----------
     axis : Polyline
         The line.
-    corridor : Corridor
     shape : Shape
         Ridges as they were measured.
     shown_m : float
         Distance of the rails that the points show where it is clearly not the expected one, else NaN.
-    sections : Sections
     """
 
     axis: Polyline
@@ -87,7 +84,6 @@ class Refined:
     ----------
     seen : Seen
         Along the curve before the last round.
-    curve : Curve
     line : Polyline
         Through the curve.
     bed, sigma_bed : (n,) arrays
@@ -164,8 +160,6 @@ def _axis_through(xy: np.ndarray, t: np.ndarray, guide: Polyline) -> Polyline:
     if len(t) < 2:
         left_m = ((xy - guide.at(t)) * guide.left_at(t)).sum(axis=1)
         return Polyline(guide.xy + left_m * guide.normals, guide.t)
-    curve = CubicSpline(t, xy, bc_type="natural") if len(t) > 2 else None
+    curve = CubicSpline(t, xy, bc_type="natural")
     inside = np.clip(wanted, t[0], t[-1])
-    if curve is None:
-        return Polyline(xy[0] + (wanted - t[0])[:, None] * (xy[1] - xy[0]) / (t[1] - t[0]), wanted)
     return Polyline(curve(inside) + (wanted - inside)[:, None] * curve(inside, 1), wanted)

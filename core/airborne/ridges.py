@@ -137,7 +137,6 @@ def fit(count: np.ndarray, height: np.ndarray, u: np.ndarray, shape: Shape, pass
     count, height : (..., k) arrays
         Number and mean height of the points in bins at distances `u` from a place.
     u : (k,) array
-    shape : Shape
     passes : int
         Robust weightings; the first is that of clean bins.
     """

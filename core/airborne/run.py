@@ -19,12 +19,10 @@ class Run:
     ----------
     request : Request
         Files, classes and extent.
-    parameters : AirborneParameters
     folder : Path
         Folder for points, 28 bytes for each around the guides and 15 for each that is searched; the caller removes it.
     runner : Runner
         Executes one task per file and one per square.
-    progress : Progress
     """
 
     request: Request

@@ -95,10 +95,8 @@ def search(
         Points in the square and within `TILE_M` around it, metres.
     first : (2,) array
         Its corner with the smallest coordinates, multiples of `TILE_M`.
-    side_m : float
     shape : Shape
         Ridges as they are expected.
-    progress : Progress
 
     Returns
     -------

@@ -80,8 +80,7 @@ def measure(corridor: Corridor, shape: Shape, shows: np.ndarray | None) -> tuple
     """Return the ridges that the profile of a whole line shows, and the distance of the rails if it is another one."""
     near = np.abs(corridor.across) < HALF_M
     if shows is not None and shows.any():
-        section = ((corridor.t - corridor.start_m) / STATION_M).astype(np.int64)
-        near &= shows[np.clip(section, 0, len(shows) - 1)]
+        near &= shows[np.clip(corridor.section_of(STATION_M), 0, len(shows) - 1)]
     bins = int(round(2 * HALF_M / PROFILE_BIN_M))
     across, height = corridor.across[near], corridor.height[near]
     count, mean = binned(np.zeros(len(across), dtype=np.int64), across, height, 1, -HALF_M, bins, PROFILE_BIN_M)
@@ -112,9 +111,8 @@ def fit_sections(corridor: Corridor, shape: Shape, reach_m: float, length_m: flo
     half, aside = int(round(HALF_M / BIN_M)), int(round(reach_m / BIN_M))
     width, places = 2 * half + 1, 2 * aside + 1
     total = max(int(np.ceil(corridor.sections * STATION_M / 2 / length_m)), 1)
-    section = ((corridor.t - corridor.start_m) / length_m).astype(np.int64)
     bins, low_m = places + width - 1, -(aside + half + 0.5) * BIN_M
-    count, height = binned(section, corridor.across, corridor.height, total, low_m, bins, BIN_M)
+    count, height = binned(corridor.section_of(length_m), corridor.across, corridor.height, total, low_m, bins, BIN_M)
     u, place = (np.arange(width) - half) * BIN_M, (np.arange(places) - aside) * BIN_M
     found = fit(windows(count, width), windows(height, width), u, shape, passes=3)
     middle = np.clip(found.both.argmax(axis=1), PARABOLA, places - 1 - PARABOLA)

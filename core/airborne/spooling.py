@@ -10,7 +10,7 @@ import numpy as np
 
 from ..clouds.points import Request
 from ..clouds.readers import Extent, read_classes
-from ..disk import writing
+from ..squares.store import SortedFile, append
 from ..tasks import READ_S, Context, Task
 from .beside import WIDE_M
 from .ridges import HALF_M
@@ -24,14 +24,12 @@ PLACE_M = 2.0
 """Side of the squares in which the density is counted."""
 
 
-def spool(run: Run, squares: Mapping[Key, tuple[Piece, ...]]) -> dict[Key, int]:
-    """Sort the points around the guides into squares on disk, and return the number in each."""
+def spool(run: Run, squares: Mapping[Key, tuple[Piece, ...]]) -> list[SortedFile]:
+    """Sort the points around the guides into squares on disk."""
     request, folder = run.request, run.folder
     wide_m = run.parameters.reach_m + WIDE_M + HALF_M
     areas = {key: areas_along(pieces, wide_m) / request.zero.horizontal_unit_m for key, pieces in squares.items()}
     around = {key: cells_around([piece.axis for piece in pieces], wide_m) for key, pieces in squares.items()}
-    with writing(folder):
-        folder.mkdir(parents=True, exist_ok=True)
     tasks = {}
     for number, header in enumerate(request.headers):
         touched = {key: some for key, all_areas in areas.items() if len(some := _touched(all_areas, header.extent))}
@@ -39,10 +37,7 @@ def spool(run: Run, squares: Mapping[Key, tuple[Piece, ...]]) -> dict[Key, int]:
             arguments = (request, number, np.concatenate([*touched.values()]), {key: around[key] for key in touched})
             weight = READ_S * (header.point_count + 1)
             tasks[number] = Task(header.path.name, spool_file, (*arguments, folder), weight=weight)
-    counts: Counter[Key] = Counter()
-    for _, one in run.runner.run(tasks, run.progress):
-        counts.update(one)
-    return dict(counts)
+    return [one for _, one in sorted(run.runner.run(tasks, run.progress), key=lambda pair: pair[0])]
 
 
 def _touched(areas: np.ndarray, extent: Extent) -> np.ndarray:
@@ -53,22 +48,13 @@ def _touched(areas: np.ndarray, extent: Extent) -> np.ndarray:
 
 def spool_file(
     request: Request, number: int, areas: np.ndarray, around: Mapping[Key, np.ndarray], folder: Path, context: Context
-) -> dict[Key, int]:
-    """Sort the points of a file into squares, and return the number in each; a task.
+) -> SortedFile:
+    """Sort the points of a file into squares; a task.
 
-    Parameters
-    ----------
-    request : Request
-    number : int
-        Of the file.
-    areas : (k, 4) array
-        Rectangles in which points are needed, units of the CRS.
-    around : mapping of Key to (m,) array
-        Cells whose points each square needs.
-    folder : Path
-    context : Context
+    Given are rectangles in which points are needed, (k, 4) in units of the CRS, and the cells whose points each square
+    needs.
     """
-    header = request.headers[number]
+    header, mine = request.headers[number], SortedFile.new_folder(folder)
     counts: Counter[Key] = Counter()
     anywhere = np.unique(np.concatenate([*around.values()]))
     chunks = read_classes(header.path, request.class_codes, context.progress, areas, request.leave_out)
@@ -81,19 +67,8 @@ def spool_file(
             own = points[in_cells(points["xyz"][:, :2], cells)]
             if len(own):
                 counts[key] += len(own)
-                with writing(folder), _file(folder, key, number).open("ab") as file:
-                    file.write(own.tobytes())
-    return dict(counts)
-
-
-def _file(folder: Path, key: Key, number: int) -> Path:
-    return folder / f"{key[0]}_{key[1]}_{number}"
-
-
-def points_of(folder: Path, key: Key) -> np.ndarray:
-    """Return the points of a square, (n,) `POINT`."""
-    files = sorted(folder.glob(f"{key[0]}_{key[1]}_*"))
-    return np.concatenate([np.fromfile(file, POINT) for file in files])
+                append(mine, key, own)
+    return SortedFile(str(mine), counts)
 
 
 def density_of(xy: np.ndarray) -> np.ndarray:

@@ -24,8 +24,7 @@ def strip_error(refined: Refined) -> np.ndarray:
     main: Sequence[int] = strips[np.argsort(-counts)][:2].tolist()
     if len(main) < 2:
         return error
-    section = ((seen.corridor.t - seen.corridor.start_m) / STATION_M).astype(np.int64)
-    section = np.clip(section, 0, len(error) - 1)
+    section = np.clip(seen.corridor.section_of(STATION_M), 0, len(error) - 1)
     one, other = (
         np.bincount(section[seen.corridor.strip == strip], minlength=len(error)).astype(float) for strip in main
     )

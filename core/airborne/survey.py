@@ -36,7 +36,6 @@ class Guide:
 
     Attributes
     ----------
-    guide_id : int
     xy : (n, 2) array
         Units of the cloud's coordinate system.
     gauge_m : float or None
@@ -90,7 +89,6 @@ class AirborneTrack:
 
     Attributes
     ----------
-    guide : Guide
     track_id : (n,) int array
         Line that each station belongs to, 0 where there is none.
     xyz : (n, 3) array
@@ -176,7 +174,6 @@ class Survey:
     tracks : tuple of AirborneTrack
         One for each guide.
     lines : tuple of AirborneLine
-    frame : LocalFrame
     density : float
         Points per square metre along the guides.
     warnings : tuple of str

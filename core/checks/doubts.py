@@ -14,7 +14,7 @@ from scipy.ndimage import uniform_filter1d
 
 from ..heads.head_points import STATION_STEP_M
 from ..parameters import ALIGNED, Parameters
-from ..polyline import interpolate, left_normals, length_along, project
+from ..polyline import Polyline, interpolate, project
 from ..progress import SILENT, Progress
 from ..rails import STRIP_OFF_M, Centerline, RailLine, StripCourse, Support
 
@@ -71,12 +71,12 @@ def find_jumps(track: Centerline, rails: Sequence[RailLine]) -> list[tuple[float
     list of tuple of float
         Chainage of each step, and its size to the left in metres: the mean of the rails, which are smoothed less.
     """
-    line = track.xyz[:, :2]
-    t = np.arange(0.0, length_along(line)[-1], STATION_STEP_M)
+    line = track.line
+    t = np.arange(0.0, line.length_m, STATION_STEP_M)
     sides = [
         [(rail.xyz, rail.support) for rail in rails if rail.rail_id in ids] for ids in (track.left_ids, track.right_ids)
     ]
-    left, right = (_shown(line, t, side if all(sides) else [(line, None)]) for side in sides)
+    left, right = (_shown(line, t, side if all(sides) else [(line.xyz, None)]) for side in sides)
     across, bend = 0.5 * (left[0] + right[0]), 0.5 * (left[1] + right[1])
     chance = STEP_SIGMAS * STEP_GAIN * 0.5 * np.hypot(left[2], right[2])
     with np.errstate(invalid="ignore"):
@@ -85,12 +85,12 @@ def find_jumps(track: Centerline, rails: Sequence[RailLine]) -> list[tuple[float
     return _peaks(t, np.where(is_step, across, 0.0))
 
 
-def _shown(line: np.ndarray, t: np.ndarray, side: Sequence[tuple[np.ndarray, Support | None]]) -> np.ndarray:
+def _shown(line: Polyline, t: np.ndarray, side: Sequence[tuple[np.ndarray, Support | None]]) -> np.ndarray:
     """Return what the lines on one side of a track show at its chainages `t`, (n,): rows of `_steps_along`, or NaN."""
     found = np.full((3, len(t)), np.nan)
     for xyz, support in side:
         places, *shown = _steps_along(xyz[:, :2], support)
-        feet = project([line], places, REACH_M)
+        feet = line.feet(places, REACH_M)
         for row, column in zip(found, shown):
             if len(feet.t) > 1:
                 here = np.interp(t, feet.t, column[feet.point], left=np.nan, right=np.nan)
@@ -134,7 +134,7 @@ def doubting_jumps(
     doubted = []
     for rail in rails:
         own = [
-            (interpolate(line.xyz[:, :2], length_along(line.xyz[:, :2]), np.array([at_m]))[0], abs(jump_m))
+            (line.line.at(np.array([at_m]))[0, :2], abs(jump_m))
             for line, at_m, jump_m in found
             if rail.rail_id in (*line.left_ids, *line.right_ids)
         ]
@@ -145,7 +145,7 @@ def doubting_jumps(
 def _doubting(rail: RailLine, found: Sequence[tuple[np.ndarray, float]]) -> RailLine:
     """Add half of the nearest step, given the places on the centerline and the sizes, to the error of a rail."""
     support = rail.support
-    feet = project([rail.xyz[:, :2]], np.array([place for place, _ in found]), REACH_M)
+    feet = rail.line.feet(np.array([place for place, _ in found]), REACH_M)
     if support is None or not len(feet.t):
         return rail
     nearest = np.argmin(np.abs(support.t[:, None] - feet.t), axis=1)
@@ -166,13 +166,13 @@ def _steps_along(line: np.ndarray, support: Support | None = None) -> tuple[np.n
         Step to the left, metres, in either direction along the line; the step that the difference between the
         curvatures on both sides looks like; standard error of the line, less what passes of a scanner add to it.
     """
-    along = length_along(line)
-    t = np.arange(0.0, along[-1], STATION_STEP_M)
+    own = Polyline(line)
+    t = np.arange(0.0, own.length_m, STATION_STEP_M)
     weights, bends = _weights()
     half = len(weights) // 2
     if len(t) < len(weights):
         return np.empty((0, 2)), *np.empty((3, 0))
-    places, normals = interpolate(line, along, t), interpolate(left_normals(line), along, t)[half:-half]
+    places, normals = own.at(t), interpolate(own.normals, own.t, t)[half:-half]
     across, bend = (
         np.einsum("ij,ij->i", np.column_stack([np.correlate(column, one, "valid") for column in places.T]), normals)
         for one in (weights, bends)
@@ -222,8 +222,7 @@ def strip_courses(centerlines: Sequence[Centerline], rows: np.ndarray) -> tuple[
 
 def _courses(centerline: Centerline, t: np.ndarray, rows: np.ndarray) -> Iterator[StripCourse]:
     """Average the offsets of each strip along one track."""
-    line = centerline.xyz[:, :2]
-    normals = interpolate(left_normals(line), length_along(line), t)
+    normals = interpolate(centerline.line.normals, centerline.line.t, t)
     across = np.einsum("ij,ij->i", rows[:, 3:5], normals)
     for strip in np.unique(rows[:, 2]):
         mine = rows[:, 2] == strip

@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 from ..errors import NoTrackError
 from ..lines.smoothing import END_SHIFT, STATIONS_PER_SIGMA, filled, smooth_line
 from ..parameters import Parameters
-from ..polyline import interpolate, is_closed, length_along, resample, unit_tangents
+from ..polyline import Polyline
 from ..progress import SILENT, Progress
 from ..rails import Centerline, RailLine
 from ..tracks.centerlines import tracks_of_class
@@ -62,20 +62,20 @@ def _off_level_m(rail: RailLine, centerlines: Sequence[Centerline]) -> float:
     """Return the height of a line above the tracks next to it if it is too high or too low for a rail, else 0."""
     if np.isnan(rail.xyz[:, 2]).any() or len(rail.xyz) < 2:
         return 0.0
-    places, _ = resample(rail.xyz, STEP_M)
-    directions = unit_tangents(places)
+    own = rail.line.resampled(STEP_M)
+    places, directions = own.xyz, own.tangents
     apart, above = np.full(len(places), np.inf), np.zeros(len(places))
     for line in centerlines:
         if np.isnan(line.xyz[:, 2]).any() or not _near(line.xyz, places):
             continue
-        stations, _ = resample(line.xyz, STEP_M)
-        distance, nearest = cKDTree(stations[:, :2]).query(places[:, :2], distance_upper_bound=REACH_M)
+        stations = line.line.resampled(STEP_M)
+        distance, nearest = cKDTree(stations.xy).query(places[:, :2], distance_upper_bound=REACH_M)
         found = np.flatnonzero(np.isfinite(distance))
         nearest = nearest[found]
-        along = np.abs(np.einsum("ij,ij->i", unit_tangents(stations)[nearest], directions[found])) > ABREAST
+        along = np.abs(np.einsum("ij,ij->i", stations.tangents[nearest], directions[found])) > ABREAST
         closer = found[along & (distance[found] < apart[found])]
         apart[closer] = distance[closer]
-        above[closer] = places[closer, 2] - stations[nearest[np.searchsorted(found, closer)], 2]
+        above[closer] = places[closer, 2] - stations.xyz[nearest[np.searchsorted(found, closer)], 2]
     compared = np.isfinite(apart)
     if np.count_nonzero(compared) < MIN_COMPARED_SHARE * len(places):
         return 0.0
@@ -130,10 +130,10 @@ def displacement(line: np.ndarray, smoothing_m: float) -> float:
 
     Applied to a line that follows its rail, it shows how far the line was displaced before.
     """
-    t = length_along(line)
-    stations = filled(t, smoothing_m / STATIONS_PER_SIGMA)
-    smoothed = smooth_line(line, smoothing_m, stations, closed=is_closed(line))
-    return float(np.hypot(*(smoothed - interpolate(line, t, stations)).T).max())
+    own = Polyline(line)
+    stations = filled(own.t, smoothing_m / STATIONS_PER_SIGMA)
+    smoothed = smooth_line(line, smoothing_m, stations, closed=own.is_closed)
+    return float(np.hypot(*(smoothed - own.at(stations)).T).max())
 
 
 def with_tracks(

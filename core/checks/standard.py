@@ -44,6 +44,13 @@ RAW_SAMPLE_POINTS = 5_000_000
 RAW_SQUARES, RAW_SQUARE_M = 2, 40.0
 """Squares in which rails are looked for, those with most points, which are next to the scanner, and their side."""
 
+LITTLE_M = 2 * RAW_SQUARE_M
+"""Length of rails with a partner below which the gauge may be another one: that of a track through one square."""
+
+MANY_TIMES = 2.0
+"""How many times as much rail another gauge shows, in these squares alone, if it is the right one: at a wrong gauge,
+ties and sides of the track make pairs of a few metres."""
+
 RAW_HEAD_M = 0.070
 """Width of a head that differs by less than 13 mm from that of any standard: heads are found 25 mm wider as well."""
 
@@ -80,20 +87,58 @@ def detect_in_raw(request: Request, progress: Progress = SILENT) -> RailStandard
 
     Parameters and errors are those of `detect_standard`; the request is for `standards.SEARCHED_CLASSES`.
     """
+    return _detected(measure_spacings(_found_at_any_gauge(request, progress)[0]), progress)
+
+
+def warn_of_raw(request: Request, found: SearchFigures, parameters: Parameters, progress: Progress = SILENT) -> bool:
+    """Look for other gauges where the search of a raw cloud found next to nothing, and warn the user if one has rails.
+
+    Parameters
+    ----------
+    request : Request
+        For `standards.SEARCHED_CLASSES`.
+    found : SearchFigures
+        Of the search at the gauges of the parameters.
+    parameters : Parameters
+    progress : Progress
+
+    Returns
+    -------
+    bool
+        Whether the user has been warned.
+    """
+    if found.paired_m >= max(found.single_m, LITTLE_M):
+        return False
+    progress.status("Looking for rails of other gauges")
+    rails, paired_m = _found_at_any_gauge(request, progress.span(0, 0))
+    return paired_m > MANY_TIMES * found.paired_m and _warn_of_spacing(rails, parameters, progress)
+
+
+def _found_at_any_gauge(request: Request, progress: Progress) -> tuple[np.ndarray, float]:
+    """Find rails for each plausible gauge where a raw cloud is densest.
+
+    Returns
+    -------
+    xyz : (n, 3) array
+        Points on the rails of the gauge of which there are most.
+    paired_m : float
+        Their length.
+    """
     xyz, census = request.sample(RAW_SAMPLE_POINTS)
     if not len(xyz):
         raise request.explain_none(census)
-    corners = np.floor(xyz[:, :2] / RAW_SQUARE_M).astype(np.int64)
+    zero = np.median(xyz[:, :2], axis=0) - RAW_SQUARE_M / 2  # so that no border follows a straight track
+    corners = np.floor((xyz[:, :2] - zero) / RAW_SQUARE_M).astype(np.int64)
     keys, square, counts = np.unique(corners, axis=0, return_inverse=True, return_counts=True)
     fullest = np.argsort(-counts, kind="stable")[:RAW_SQUARES]
-    squares = [(np.append(RAW_SQUARE_M * keys[one], 0.0), xyz[square.ravel() == one]) for one in fullest]
+    squares = [(np.append(zero + RAW_SQUARE_M * keys[one], 0.0), xyz[square.ravel() == one]) for one in fullest]
     best_m, best = 0.0, np.empty((0, 3))
     for gauge_m in progress.follow(_plausible_gauges()):
         found = _found(squares, Settings((gauge_m,), RAW_HEAD_M))
         paired_m = sum(one.figures.paired_m for one in found)
         if paired_m > best_m:
             best_m, best = paired_m, np.concatenate([one.rails for one in found])
-    return _detected(measure_spacings(best), progress)
+    return best, best_m
 
 
 _Square = tuple[np.ndarray, np.ndarray]

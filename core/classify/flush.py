@@ -19,9 +19,10 @@ from .pieces import lengths, links, pieces_of
 from .settings import Settings
 from .tops import TENTHS_OF_MM, Grid, centroids
 
-MIN_PER_M2 = 800.0
-"""Least points per square metre of a pavement that shows grooves: they are 35 mm apart then, and each groove of 42 mm
-holds a row of them. Between points that are further apart, a groove and a wave of the pavement look alike."""
+MIN_PER_M2 = 500.0
+"""Least points per square metre of a pavement that shows grooves: they are 45 mm apart then, and each groove of 42 mm
+holds most of a row of them. Between points that are further apart, as those of images are, a groove and a wave of the
+pavement look alike."""
 
 MIN_SHARE, LEVEL_M, NEAR_BED_M = 0.65, 0.008, 0.03
 """A coarse cell is paved if this share of its points is this close to their mean height; the mean is that of the

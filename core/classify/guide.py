@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..polyline import resample, runs, unit_tangents
+from ..polyline import Polyline, runs
 from .lines import Lines
 from .partner import MAJORITY, MIN_STATIONS, SPACING_M, partners
 from .pieces import pieces_of
@@ -58,8 +58,8 @@ class Guide:
             ends = np.stack([line[:-1], line[1:]])
             near = ((ends.max(axis=0) >= low) & (ends.min(axis=0) <= high)).all(axis=1)
             for first, last in runs(near):
-                stations, _ = resample(line[first : last + 2], STEP_M)
-                parts.append(np.column_stack([stations, unit_tangents(stations)]))
+                stations = Polyline(line[first : last + 2]).resampled(STEP_M)
+                parts.append(np.column_stack([stations.xyz, stations.tangents]))
         found = np.concatenate(parts)
         found = found[((found[:, :2] >= low) & (found[:, :2] <= high)).all(axis=1)]
         return cls(found[:, :2], found[:, 2:], distance_m, only)

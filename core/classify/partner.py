@@ -28,8 +28,9 @@ ANGLE_RAD = 0.12
 CANDIDATES = 6
 """Lines that are looked at for one station: other rails may be near at turnouts."""
 
-INSIDE_M = (0.02, 0.05)
-"""What runs inside a track is this far beyond a head's width from the rail, and within the gauge by as much."""
+INSIDE_M = 0.02
+"""What runs inside a track is this far beyond a head's width from a rail at least, and too close to it for its partner:
+a guard rail beside that one is, on the other side of a flangeway of 38 to 60 mm."""
 
 PARALLEL_RAD = 0.07
 """Angle to the rail within which a line runs along it; the branch of a turnout leaves at 1:9 to 1:14."""
@@ -141,7 +142,8 @@ def runs_inside(
     step = lines.axis[own] - lines.axis[rail]
     left = np.abs(np.einsum("ij,ij->i", step, lines.across[rail]))
     ahead = np.abs(np.einsum("ij,ij->i", step, lines.along[rail]))
-    beside = (left > head_width_m + INSIDE_M[0]) & (left < max(gauges_m) - INSIDE_M[1]) & (ahead < LEVEL_WITH_M)
+    too_close_m = max(gauges_m) + head_width_m - SPACING_M
+    beside = (left > head_width_m + INSIDE_M) & (left < too_close_m) & (ahead < LEVEL_WITH_M)
     beside &= _angle(lines.theta[own], lines.theta[rail]) < PARALLEL_RAD
     inside[own[beside]] = True
     return _majority(inside, links)

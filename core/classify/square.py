@@ -34,6 +34,11 @@ DENSITY_QUANTILE = 0.75
 SINGLE_HEIGHT_M = 0.12
 """Least height above the bed of a rail without a partner: lower things are edges of slopes, kerbs and boards."""
 
+SINGLE_WIDTH = 0.2
+"""Least width of a rail without a partner by that of a head. A single profile of the scanner is a bar of no width where
+the ground falls beside it, as at the edge of a road: measured 2 to 4 mm. Heads measure 68 mm, and 19 mm where a train
+hides most of them."""
+
 SINGLE_SLOPE = 0.4
 """Steepest bed of a rail without a partner: that of the shoulder of a ballast bed is 0.67. Where the far side of a
 slope is hidden, its crest looks like a bar."""
@@ -433,10 +438,11 @@ def _stands_alone(
 ) -> np.ndarray:
     """Return which pieces, of (pieces,) widths, may be rails without a partner, (pieces,) bool.
 
-    They are as narrow as a head, stand as high as a rail does that is not buried in ballast, and their bed is not
-    steeper than a track's.
+    They are as narrow as a head and no narrower, stand as high as a rail does that is not buried in ballast, and their
+    bed is not steeper than a track's.
     """
     narrow = width_m < settings.head_width_m + tolerances.wider_single_m
+    narrow &= width_m >= SINGLE_WIDTH * settings.head_width_m
     high = _mean(kept.lines.height, piece) >= SINGLE_HEIGHT_M
     return narrow & high & (_mean(bed.slopes(kept.lines.axis), piece) <= SINGLE_SLOPE)
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..polyline import interpolate, length_along
+from ..polyline import Polyline
 from ..progress import SILENT, Progress
 from .points import Request
 from .readers import CloudHeader
@@ -49,10 +49,10 @@ class CrossSection:
 
 def cross_section_at(line: np.ndarray, share: float) -> CrossSection:
     """Return the plane across a line, (n, 3) metres, at a share of its plan length."""
-    along = length_along(line[:, :2])
-    at = share * along[-1]
-    segment = int(np.clip(np.searchsorted(along, at, side="right") - 1, 0, len(line) - 2))
-    place = interpolate(line, along, np.array([at]))[0]
+    own = Polyline(line)
+    at = share * own.length_m
+    segment = int(np.clip(np.searchsorted(own.t, at, side="right") - 1, 0, len(line) - 2))
+    place = own.at(np.array([at]))[0]
     step = line[segment + 1, :2] - line[segment, :2]
     return CrossSection(place, step / np.hypot(*step))
 

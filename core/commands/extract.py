@@ -37,6 +37,7 @@ from .options import (
     add_method_arguments,
     add_outputs,
     add_tiles_argument,
+    axis_of,
     destinations_of,
     gauges_of,
     numbers_in,
@@ -227,7 +228,7 @@ def _run_in(
         request = replace(request, merged=args.merge_classes and not raw)
         wkt = request.zero.crs_wkt
         seeds = vector_module("--seeds").read_seeds(args.seeds, wkt) if args.seeds else ()
-        axes = vector_module("--axis", "kilometres").read_axes(args, None, wkt)[0] if args.axis else None
+        axes = vector_module("--axis", "kilometres").read_axes(axis_of(args), None, wkt)[0] if args.axis else None
         network = extract_files(request, folder.resolve(), parameters, runner, progress, args.classify, weights, seeds)
     if axes is not None:
         network = replace(network, geometry=axes.along(network.geometry, network.frame, progress))

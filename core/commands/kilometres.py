@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import argparse
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -20,6 +19,7 @@ from ..design_places import are_places
 from ..disk import Destination
 from ..errors import CrsError, MissingError, ParameterError
 from ..fields import EXTENT_FIELDS, STATION_FIELDS, Field
+from ..jobs.shared import DECREASING
 from ..output.geopackage import geometries_in
 from ..output.writing import column_of, write_table
 from ..progress import Progress
@@ -39,13 +39,13 @@ def _with_measures(features: Features, file: str) -> Features:
     return replace(features, shapes=shapely.from_wkb([stored.get(int(number)) for number in features.ids]))
 
 
-def read_axes(args: argparse.Namespace, places: str | None, plane: str | None = None) -> tuple[PlacedAxes, str | None]:
-    """Read the axes that the options state; also return the coordinate system of their plane.
+def read_axes(given: Mapping[str, Any], places: str | None, plane: str | None = None) -> tuple[PlacedAxes, str | None]:
+    """Read the axes that values state; also return the coordinate system of their plane.
 
     Parameters
     ----------
-    args : Namespace
-        With `axis` and the options of `options.add_axis_arguments`.
+    given : mapping
+        With AXIS and what goes with it.
     places : str or None
         Coordinate system of what is to be located.
     plane : str, optional
@@ -56,7 +56,7 @@ def read_axes(args: argparse.Namespace, places: str | None, plane: str | None = 
     CrsError, ParameterError, RailExtractError
         A file lacks what it should state, or they contradict each other.
     """
-    features = _with_measures(read_features(args.axis, "AXIS"), args.axis)
+    features = _with_measures(read_features(given["AXIS"], "AXIS"), given["AXIS"])
     stated_systems = [one for one in (plane, features.crs_wkt, places) if one]
     crs_wkt = next((one for one in stated_systems if not is_geographic(parse_crs(one))), None)
     if crs_wkt is None and stated_systems:
@@ -65,10 +65,11 @@ def read_axes(args: argparse.Namespace, places: str | None, plane: str | None = 
     lines = list(_axis_lines(features, crs_wkt, unit_m))
     if not lines:
         raise MissingError("AXIS", "line")
-    start = None if args.start_km is None else Start(args.start_km, args.decreasing)
-    posts = _posts(read_features(args.posts, "POSTS"), args.post_field, crs_wkt, unit_m) if args.posts else []
-    made = make_axes(lines, start, posts, _jumps(read_features(args.jumps, "JUMPS")) if args.jumps else [])
-    return PlacedAxes(Axes(made.axes, made.notices), unit_m, args.format), crs_wkt
+    start_km, posts_file, jumps = (given[name] for name in ("START_KM", "POSTS", "JUMPS"))
+    start = None if start_km is None else Start(start_km, given["DIRECTION"] == DECREASING)
+    posts = _posts(read_features(posts_file, "POSTS"), given["POST_FIELD"], crs_wkt, unit_m) if posts_file else []
+    made = make_axes(lines, start, posts, _jumps(read_features(jumps, "JUMPS")) if jumps else [])
+    return PlacedAxes(Axes(made.axes, made.notices), unit_m, given["FORMAT"]), crs_wkt
 
 
 def located(

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import argparse
-import math
 import signal
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import replace
 from importlib import import_module
@@ -17,6 +16,7 @@ from ..alignment.km_text import HECTOMETRES, NOTATIONS
 from ..clouds.points import Request, ask
 from ..disk import Destination, writing
 from ..errors import ParameterError
+from ..jobs.shared import DECREASING, INCREASING
 from ..parameters import DEFAULT_WORKERS, GEOMETRY, LEARNED, LEAVE_OUT, MAX_WORKERS, METHODS, Parameters
 from ..progress import Progress
 from ..standards import DEFAULT, Gauge, RailStandard, read_gauges
@@ -82,6 +82,12 @@ def add_axis_arguments(parser: argparse._ActionsContainer) -> None:
     parser.add_argument("--jumps", metavar="FILE", help=text)
     text = f"how km_text writes kilometres (default: {HECTOMETRES})"
     parser.add_argument("--format", choices=tuple(NOTATIONS), default=HECTOMETRES, help=text)
+
+
+def axis_of(args: argparse.Namespace) -> dict[str, Any]:
+    """Return what the options say of an axis, by the names of its parameters."""
+    values = {"AXIS": args.axis, "START_KM": args.start_km, "DIRECTION": DECREASING if args.decreasing else INCREASING}
+    return {**values, "POSTS": args.posts, "POST_FIELD": args.post_field, "JUMPS": args.jumps, "FORMAT": args.format}
 
 
 LAYER, TABLE, REPORT = (".gpkg", ".dxf", ".csv"), (".gpkg",), (".html", ".htm")
@@ -200,40 +206,6 @@ def gauges_of(args: argparse.Namespace, standard: RailStandard, tolerance_m: flo
     return read_gauges(args.other_gauges, "--other-gauges", standard, own_m, tolerance_m is not None)
 
 
-def positive(text: str) -> float:
-    """Return a length that an option states.
-
-    Raises
-    ------
-    argparse.ArgumentTypeError
-        It is not a positive number.
-    """
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not 0 < value < math.inf:
-        raise argparse.ArgumentTypeError(f"{text} is not a positive number")
-    return value
-
-
-def add_length(parser: argparse._ActionsContainer, option: str, default: float, text: str, unit: str = "M") -> None:
-    """Declare an option that states a length."""
-    help_text = f"{text} (default: {default:g})"
-    parser.add_argument(option, type=positive, default=default, metavar=unit, help=help_text)
-
-
-def add_lengths(parser: argparse._ActionsContainer, texts: Mapping[str, str], defaults: type) -> None:
-    """Declare an option for each length, an attribute of `defaults` without its unit."""
-    for name, text in texts.items():
-        add_length(parser, f"--{name.replace('_', '-')}", getattr(defaults, f"{name}_m"), text)
-
-
-def lengths_of(args: argparse.Namespace, texts: Mapping[str, str]) -> dict[str, float]:
-    """Return the lengths of `add_lengths` as arguments of the class of the defaults."""
-    return {f"{name}_m": getattr(args, name) for name in texts}
-
-
 def numbers_in(text: str, option: str, kind: type) -> tuple:
     """Return the distinct numbers in a text such as "10,11" or "1000;1067".
 
@@ -289,10 +261,15 @@ class Console(Progress):
 
     Python drops the exception of a Ctrl-C that comes during a finalizer or some callbacks. The run then ends at its
     next check for cancellation.
+
+    Parameters
+    ----------
+    word : callable
+        Returns a message with the names of options for those of parameters.
     """
 
-    def __init__(self) -> None:
-        self._interrupted = False
+    def __init__(self, word: Callable[[str], str] = str) -> None:
+        self._interrupted, self._word = False, word
         signal.signal(signal.SIGINT, self._interrupt)
 
     def _interrupt(self, *_: object) -> None:
@@ -309,8 +286,8 @@ class Console(Progress):
 
     def info(self, text: str) -> None:
         """Print what was done."""
-        print(text, file=sys.stderr, flush=True)
+        print(self._word(text), file=sys.stderr, flush=True)
 
     def warning(self, text: str) -> None:
         """Print a warning."""
-        print(f"Warning: {text}", file=sys.stderr, flush=True)
+        print(f"Warning: {self._word(text)}", file=sys.stderr, flush=True)

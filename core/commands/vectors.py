@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import math
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,18 +14,12 @@ import pyogrio
 import shapely
 
 from ..airborne.survey import Guide, gauge_of
-from ..alignment.cant_of_rails import cant_of_rails
-from ..alignment.elements import Alignment
-from ..alignment.measured import Track, stations_by_track, with_cant
-from ..alignment.table import alignments, check_table, frame_of, read_table
-from ..clouds.crs import import_pyproj, is_geographic, name_of, parse_crs, same_plane, units
+from ..clouds.crs import import_pyproj, is_geographic, parse_crs, units
 from ..clouds.mask import Mask
-from ..comparison.tracks import SurveyedLine
 from ..design_places import check_line, check_places
-from ..errors import CrsError, MissingError, ParameterError
-from ..frame import ORIGIN_STEP, LocalFrame
-from ..progress import SILENT, Progress
-from ..rails import RailLine
+from ..errors import ParameterError
+from ..jobs.lines import Lines, system_of, without_steps
+from ..progress import Progress
 
 LAYER = "|layername="
 """What separates a file from the layer in it, as QGIS writes it."""
@@ -60,44 +53,11 @@ class Features:
             {name: _plain(values[number]) for name, values in self.columns.items()} for number in range(len(self.ids))
         ]
 
-    @property
-    def system(self) -> tuple[str | None, float, float]:
-        """Coordinate system, and its units in plan and in height, metres.
-
-        Raises
-        ------
-        CrsError
-            It is in degrees.
-        """
-        if self.crs_wkt is None:
-            return None, 1.0, 1.0
-        crs = parse_crs(self.crs_wkt)
-        if is_geographic(crs):
-            raise CrsError(
-                f"{self.option} is in degrees ({name_of(crs)}), where lengths can't be measured: reproject it, for "
-                "example to the UTM zone of the place."
-            )
-        return (self.crs_wkt, *units(crs))
-
-    def lines(self) -> tuple[list[tuple[int, dict[str, Any], np.ndarray]], LocalFrame]:
-        """Return feature id, values and vertices, (n, 3) local metres, of each line; z is NaN without heights.
-
-        Raises
-        ------
-        CrsError
-            The lines are in degrees.
-        ParameterError
-            There are none.
-        """
+    def lines(self, progress: Progress) -> Lines:
+        """Return the parts of all lines that have a length; see `Lines.of`."""
         rows = self.rows()
-        found = [(int(self.ids[n]), rows[n], _vertices(part)) for n, part in self.parts(None, "LineString")]
-        if not found:
-            raise MissingError(self.option, "line")
-        crs_wkt, horizontal_unit_m, vertical_unit_m = self.system
-        middle = np.median(np.concatenate([xyz for _, _, xyz in found]), axis=0)
-        origin = np.round(np.nan_to_num(middle) / ORIGIN_STEP) * ORIGIN_STEP
-        frame = LocalFrame(origin, horizontal_unit_m, vertical_unit_m, crs_wkt)
-        return [(feature, row, frame.to_local(xyz)) for feature, row, xyz in found], frame
+        parts = ((int(self.ids[n]), rows[n], _vertices(part)) for n, part in self.parts(None, "LineString"))
+        return Lines.of(self.option, parts, list(self.columns), system_of(self.crs_wkt, progress), progress)
 
     def in_plane(self, crs_wkt: str | None) -> np.ndarray:
         """Return the geometries in another coordinate system; as they are if either is unknown."""
@@ -260,119 +220,8 @@ def read_mask(file: Path, crs_wkt: str | None) -> Mask:
     return Mask.of([shapely.get_coordinates(ring) for ring in shapely.get_rings(united)])
 
 
-def read_tracks(
-    lines: str, quality: str | None, rails: str | None, option: str = "LINES"
-) -> tuple[list[Track], LocalFrame]:
-    """Read centerlines with their cant: from the track geometry, else from the rails; `option` names the lines.
-
-    Raises
-    ------
-    CrsError, ParameterError
-        A file has no lines, lacks a field, or states the cant of other tracks.
-    """
-    found, frame = read_features(lines, option).lines()
-    tracks = [(_whole(row.get("track_id"), feature), xyz) for feature, row, xyz in found]
-    if quality is not None:
-        features = read_features(quality, "--quality")
-        stations = stations_by_track(features.rows(), features.columns, "--quality")
-        return with_cant(tracks, stations, "--quality", option), frame
-    shapes = [] if rails is None else [xyz for _, _, xyz in _lines_in(read_features(rails, "--rails"), frame)]
-    return [
-        Track(number, xyz, cant_of_rails(xyz, shapes), np.zeros(len(xyz), dtype=bool)) for number, xyz in tracks
-    ], frame
-
-
-def read_elements(file: str, option: str, crs: str | None = None, progress: Progress = SILENT) -> list[Alignment]:
-    """Read the alignments of an element table; `crs` is that of a table without geometries.
-
-    Raises
-    ------
-    CrsError, ParameterError, RailExtractError
-        It is not an element table, an element is wrong, or it is in degrees.
-    """
-    found = read_features(file, option)
-    check_table(found.columns, option)
-    rows = read_table(found.rows(), option)
-    stated = found.crs_wkt or (parse_crs(crs).to_wkt() if crs else None)
-    return alignments(rows, frame_of(rows, replace(found, crs_wkt=stated).system, option), progress)
-
-
-def read_survey(file: str, option: str, frame: LocalFrame | None) -> tuple[list[SurveyedLine], LocalFrame]:
-    """Read the lines of a survey with their standard errors, in a frame or in one of their own.
-
-    A line's number is its `rail_id`, else its `track_id`, else the id of its feature. With a `track_id` only, it is a
-    centerline.
-    """
-    features = read_features(file, option)
-    found, own = features.lines()
-    if frame is not None:
-        found, own = _lines_in(features, frame), frame
-    named = next((name for name in ("rail_id", "track_id") if name in features.columns), "")
-    return [
-        SurveyedLine(
-            _whole(row.get(named), feature),
-            xyz,
-            _number(row.get("sigma_mm")) / 1000,
-            _number(row.get("sigmaz_mm")) / 1000,
-            named != "track_id",
-        )
-        for feature, row, xyz in found
-    ], own
-
-
-def read_rails(file: str, option: str, frame: LocalFrame) -> list[RailLine]:
-    """Read rails with their standard errors, in a frame."""
-    return [
-        RailLine(
-            xyz,
-            _whole(row.get("rail_id"), feature),
-            _whole(row.get("class_code"), 0),
-            _number(row.get("points")),
-            _number(row.get("resid_mm")),
-            _number(row.get("sigma_mm")),
-            _number(row.get("bridged_m")),
-            sigmaz_mm=_number(row.get("sigmaz_mm")),
-        )
-        for feature, row, xyz in _lines_in(read_features(file, option), frame)
-    ]
-
-
-def _lines_in(features: Features, frame: LocalFrame) -> list[tuple[int, dict[str, Any], np.ndarray]]:
-    """Return the lines in a frame.
-
-    Raises
-    ------
-    CrsError
-        Their coordinate system is another one.
-    """
-    found, own = features.lines()
-    shift = shift_between(features.option, own, frame)
-    return [(feature, row, xyz + shift) for feature, row, xyz in found]
-
-
-def shift_between(option: str, own: LocalFrame, frame: LocalFrame) -> np.ndarray:
-    """Return what moves places, (3,) metres, of the lines that an option names into another frame.
-
-    Raises
-    ------
-    CrsError
-        Their coordinate system is another one.
-    """
-    if own.crs_wkt and frame.crs_wkt and not same_plane(own.crs_wkt, frame.crs_wkt, tuple(frame.origin[:2])):
-        names = (name_of(parse_crs(wkt)) for wkt in (own.crs_wkt, frame.crs_wkt))
-        raise CrsError(
-            f"{option} is in {next(names)} but the other lines in {next(names)}: give both in the same coordinate "
-            "system."
-        )
-    return own.shift_to(frame)
-
-
 def _vertices(line: shapely.LineString) -> np.ndarray:
-    """Return the vertices of a line, (n, 3), without those that repeat the one before."""
-    xyz = shapely.get_coordinates(line, include_z=True)
-    if not np.isfinite(xyz[:, 2]).all():
-        xyz[:, 2] = np.nan
-    return xyz[np.append(True, np.any(np.diff(xyz[:, :2], axis=0) != 0, axis=1))]
+    return without_steps(shapely.get_coordinates(line, include_z=True))
 
 
 def _plain(value: Any) -> Any:
@@ -381,13 +230,5 @@ def _plain(value: Any) -> Any:
     return None if value is None or value != value else value
 
 
-def _number(value: Any) -> float:
-    return float(value) if isinstance(value, (int, float)) else math.nan
-
-
 def _word(value: Any) -> str:
     return "" if value is None else str(value)
-
-
-def _whole(value: Any, default: int) -> int:
-    return int(value) if isinstance(value, (int, float)) and float(value).is_integer() else default

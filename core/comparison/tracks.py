@@ -179,7 +179,6 @@ class TrackComparison:
     ----------
     lines : tuple of LineDifferences
         One for each line of the reference, then one for each line of the other survey with extra lengths.
-    shift : Shift
     estimated_m : float
         Standard error across that the scatter of the differences shows, where lines state none; NaN otherwise.
     """
@@ -227,8 +226,6 @@ def compare_surveys(
     ----------
     reference, other : Survey
         In the same frame.
-    settings : ComparisonParameters
-    progress : Progress
     """
     own, others = (cut([line.xyz for line in survey.lines]) for survey in (reference, other))
     chords = own, others

@@ -48,7 +48,6 @@ class Architecture:
 
     Attributes
     ----------
-    channels : int
     kernel_radius : int
         The side of a kernel is twice that plus one.
     dilations : tuple of int
@@ -102,7 +101,6 @@ class Convolution:
     ----------
     weight : (out, in, side, side) float32 array
     bias : (out,) float32 array
-    dilation : int
     """
 
     weight: np.ndarray
@@ -121,7 +119,6 @@ class FoldedLayer:
 
     Attributes
     ----------
-    convolution : Convolution
     reduction : Convolution, optional
         Applied to the channels of the result followed by those of the layer's input.
     is_output : bool

@@ -39,11 +39,8 @@ def clean(raster: RailRaster, engine: Engine, passes: int = DEFAULT_PASSES, prog
 
     Parameters
     ----------
-    raster : RailRaster
-    engine : Engine
     passes : int
         Number of passes; with 0, passes run until the result is stable, at most `MAX_PASSES`.
-    progress : Progress
 
     Returns
     -------

@@ -30,7 +30,6 @@ class Piece:
     ----------
     row, column : int
         North-west corner.
-    height, width : int
     """
 
     row: int

@@ -91,7 +91,6 @@ class Engine(ABC):
             Number of the pass, from 0.
         pieces : sequence of Piece
             Positions of the pieces, which do not overlap.
-        progress : Progress
 
         Returns
         -------
@@ -134,14 +133,12 @@ class Engine(ABC):
 
         Parameters
         ----------
-        step : Step
         held : sequence of arrays
             Input of the layer, for each piece.
         outside : array
             Its input on an empty raster.
         near : sequence of sequence of Overlap, optional
             What surrounds each piece; None for a layer without reach.
-        number : int
         """
         own, reach = held[number], step.reach
         if near is None:
@@ -235,7 +232,6 @@ def overlaps(windows: np.ndarray, reach: int) -> list[list[Overlap]]:
     ----------
     windows : (n, 4) int array
         Row, column, height and width of each piece.
-    reach : int
     """
     corners, ends = windows[:, :2], windows[:, :2] + windows[:, 2:]
     first = np.maximum(corners, corners[:, None] - reach)

@@ -24,7 +24,6 @@ class Model:
     ----------
     name : str
         Option of the parameter MODEL, and value in raster tags.
-    gauge_m, head_width_m : float
     file : str
         Name of the .npz file in the folder `models`.
     """
@@ -61,7 +60,6 @@ def choose(gauge_m: float, head_width_m: float, name: str = Parameters.model) ->
 
     Parameters
     ----------
-    gauge_m, head_width_m : float
     name : str
         One of `NAMES`.
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..polyline import length_along, runs
+from ..polyline import Polyline, runs
 from ..progress import SILENT, Progress
 from .course import smoothed
 from .follow import Reason, Window, follow, turned
@@ -64,8 +64,11 @@ def grow(points: OnHeads, seed: np.ndarray, settings: GrowSettings, progress: Pr
         None if the seed is not on a rail.
     """
     start = find_start(points, seed, settings)
-    if start is None:
-        return None
+    return None if start is None else grow_from(points, start, settings, progress)
+
+
+def grow_from(points: OnHeads, start: Start, settings: GrowSettings, progress: Progress = SILENT) -> Growth | None:
+    """Follow a rail that was found at a seed to both sides; see `grow`."""
     ahead, back = progress.split(2)
     onwards, last = follow(points, start, start.xyz, settings, ahead)
     # The way back begins beyond the seed, so that both rails are measured there.
@@ -97,7 +100,7 @@ def _rail(windows: Sequence[Window], is_other: bool, start: Start, settings: Gro
     chosen = slice(int(own[0]), int(own[-1]) + 1)
     xyz = np.array([window.other_xyz if is_other else window.xyz for window in windows[chosen]])
     is_seen = np.array([head is not None for head in heads[chosen]])
-    along_m = length_along(xyz[:, :2])
+    along_m = Polyline(xyz).t
     smooth = smoothed(xyz, along_m, start.beam.smooth_m, is_seen)
     return Rail(smooth, _bridged(is_seen, settings.parameters.max_outliers), start.beam)
 

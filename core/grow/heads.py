@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 from ..classify.flush import BESIDE_M, HEAD_LEVEL_M
 from ..classify.sharpness import is_blunt, is_decided
 from ..classify.square import classify_square
-from ..polyline import Feet, length_along, project
+from ..polyline import Feet, Polyline
 from ..rails import SearchFigures
 from .settings import BLUNT, DENSE, THIN, Beam, GrowSettings
 
@@ -67,7 +67,7 @@ class Rail:
     @property
     def length_m(self) -> float:
         """Length in plan."""
-        return float(length_along(self.xyz[:, :2])[-1])
+        return Polyline(self.xyz).length_m
 
 
 def heads_in(
@@ -153,12 +153,14 @@ class OnHeads:
 
     def on(self, rails: Sequence[Rail]) -> Iterator[tuple[Key, np.ndarray]]:
         """Yield the squares in which points lie on rails, and the numbers of these points as they are read."""
+        boxes = np.array([(rail.xyz.min(axis=0), rail.xyz.max(axis=0)) for rail in rails]).reshape(-1, 2, 3)[..., :2]
         for key in sorted(self._squares):
             xyz = self._read(key)
             corner = np.multiply(key, self._own.side_m)
             own = np.flatnonzero(self._own.own(xyz[:, :2] - corner))
             on = np.zeros(len(xyz), dtype=bool)
-            for rail in rails:
+            near = (boxes[:, 0] <= corner + 2 * self._own.side_m) & (boxes[:, 1] >= corner - self._own.side_m)
+            for rail in (rails[at] for at in np.flatnonzero(near.all(axis=1)).tolist()):
                 on[own[self._level_with(rail, xyz[own], self._squares[key])]] = True
                 if rail.beam is not THIN:  # whose points beside the head are labelled as well
                     on[self._squares[key].number[self._along(rail, self._squares[key].xyz).point]] = True
@@ -167,11 +169,11 @@ class OnHeads:
 
     def _along(self, rail: Rail, xyz: np.ndarray) -> Feet:
         """Project points, (n, 3), in the user's strip onto a rail."""
-        return project([rail.xyz[:, :2]], xyz[:, :2], self._settings.parameters.thickness_m / 2 + rail.beam.widen_m)
+        return Polyline(rail.xyz).feet(xyz[:, :2], self._settings.parameters.thickness_m / 2 + rail.beam.widen_m)
 
     def _level_with(self, rail: Rail, xyz: np.ndarray, square: _Square) -> np.ndarray:
         """Return the numbers of the points, (n, 3), in the height of a rail; beside it, a pavement is as high."""
-        along_m = length_along(rail.xyz[:, :2])
+        along_m = Polyline(rail.xyz).t
         borders = (along_m[1:] + along_m[:-1]) / 2
         paved = np.zeros(len(along_m), dtype=bool)
         paved[np.searchsorted(borders, self._along(rail, square.xyz[square.paved]).t)] = True

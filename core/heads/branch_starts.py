@@ -13,7 +13,7 @@ import numpy as np
 
 from ..lines.ends import ARC, STRAIGHT, PartingLaw, left_of
 from ..lines.network import LineNetwork
-from ..polyline import length_along, project
+from ..polyline import Polyline
 from .head_points import HeadPoints
 
 APART_HEADS = 1.3
@@ -112,8 +112,8 @@ def _parting(network: LineNetwork, end: int, number: int, between_m: tuple[float
     """See how a line's end parts from the line of pass `number`; None where too little of it is visible."""
     _, stock, vertex = network.passes[number].tolist()
     branch, line = network.from_end(end), network.lines[stock]
-    along = length_along(line)
-    feet = project([line], branch, MAX_BACK_M / 10)
+    own = Polyline(line)
+    along, feet = own.t, own.feet(branch, MAX_BACK_M / 10)
     feet = feet[np.argsort(feet.point)]
     if len(feet.t) < 2:
         return None
@@ -135,7 +135,7 @@ def _slide(network: LineNetwork, end: int, number: int, between_m: tuple[float, 
     if not parting.way[0] - MAX_BACK_M <= touch < parting.way[0]:
         return network
     line, vertex = network.lines[parting.stock], network.passes[number, 2]
-    along = length_along(line)
+    along = Polyline(line).t
     start = int(np.argmin(np.abs(along - along[vertex] - parting.sense * touch)))
     if not 0 < start < len(line) - 1 or network.meets(end // 2, *network.span(end, parting.kept)):
         return network
@@ -158,7 +158,7 @@ def _part(apart: np.ndarray, min_m: float, max_m: float) -> tuple[int, int]:
 def _points_of_arc(network: LineNetwork, parting: _Parting, xyz: np.ndarray, head_width_m: float) -> np.ndarray:
     """Count points where only an arc has its head, and on as wide a part of the adjacent head: (2,)."""
     blade, arc = parting.law(STRAIGHT), parting.law(ARC)
-    line, along = network.lines[parting.stock], length_along(network.lines[parting.stock])
+    line, along = network.lines[parting.stock], Polyline(network.lines[parting.stock]).t
     way = parting.sense * (along - parting.node_m)
     shared = (way >= max(arc.touch, parting.way[0] - MAX_BACK_M)) & (way <= parting.way[0])
     if np.count_nonzero(shared) < 2 or not np.isfinite(arc.touch):
@@ -168,7 +168,7 @@ def _points_of_arc(network: LineNetwork, parting: _Parting, xyz: np.ndarray, hea
     low, high = piece.min(axis=0) - reach_m, piece.max(axis=0) + reach_m
     near = xyz[slice(*np.searchsorted(xyz[:, 0], [low[0], high[0]]))]
     near = near[(near[:, 1] > low[1]) & (near[:, 1] < high[1])]
-    feet = project([piece], near[:, :2], reach_m)
+    feet = Polyline(piece).feet(near[:, :2], reach_m)
     if not len(feet.t):
         return np.zeros(2)
     free = np.ones((2, 0), dtype=bool)

@@ -14,7 +14,7 @@ import numpy as np
 from ..clouds.points import RailPoints
 from ..lines.network import LineNetwork
 from ..parameters import Parameters
-from ..polyline import interpolate, length_along, project, resample, starts_at_its_end
+from ..polyline import Polyline, project
 from ..progress import SILENT, Progress
 from ..rails import RailLine, Support
 from .axis import CELL_M, Axis, unseen_m
@@ -136,10 +136,10 @@ def _begun_on(others: Sequence[RailLine], rail: RailLine, reach_m: float) -> Rai
     feet = project([other.xyz[:, :2] for other in others if gap_m], rail.xyz[:1, :2], reach_m)
     if not len(feet.t):
         return rail
-    other, (t,), along = others[feet.line[0]], feet.t, length_along(rail.xyz[:, :2])
+    other, (t,), along = others[feet.line[0]], feet.t, rail.line.t
     if any(start <= t <= end for start, end in other.gaps):
         return rail
-    above_m = np.interp(t, length_along(other.xyz[:, :2]), other.xyz[:, 2]) - rail.xyz[0, 2]
+    above_m = np.interp(t, other.line.t, other.xyz[:, 2]) - rail.xyz[0, 2]
     raised_m = above_m * np.maximum(1 - along / gap_m, 0.0) ** 2
     return replace(rail, xyz=rail.xyz + raised_m[:, None] * [0.0, 0.0, 1.0])
 
@@ -170,7 +170,7 @@ def flat_rail(line: np.ndarray, class_code: int) -> RailLine:
 
 def numbered(rails: Sequence[RailLine]) -> tuple[RailLine, ...]:
     """Turn rails so that they start in the west, and number them from west to east."""
-    directed = (rail.reversed() if starts_at_its_end(rail.xyz) else rail for rail in rails)
+    directed = (rail.reversed() if rail.line.starts_at_its_end else rail for rail in rails)
     ordered = sorted(directed, key=lambda rail: tuple(rail.xyz[0, :2]))
     return tuple(replace(rail, rail_id=number) for number, rail in enumerate(ordered, start=1))
 
@@ -196,7 +196,7 @@ def _measured(
     if strips is not None:
         support = strips.added_to(support, parameters.align)
     support = support.between(start, end)
-    xyz = np.column_stack([interpolate(near.line, along, stations), top.course.at(stations)])
+    xyz = np.column_stack([Polyline(near.line).at(stations), top.course.at(stations)])
     figures = (len(supporting.t), 1000 * resid, 1000 * support.rms_m, bridged)
     return RailLine(xyz, 0, 0, *figures, gaps - start, support, sigmaz_mm=1000 * support.rmsz_m)
 
@@ -244,7 +244,7 @@ def measure_again(
     list of RailLine
         In the order given. A rail without points keeps its heights and is a gap from end to end.
     """
-    plans = [resample(rail.xyz[:, :2], KNOT_M)[0] for rail in rails]
+    plans = [rail.line.resampled(KNOT_M).xy for rail in rails]
     near = near_lines(plans, points.xyz, head_width_m, points.strips, progress.span(0.0, 0.7), points.blunt)
     measured = []
     for rail, head in zip(rails, progress.span(0.7, 1.0).follow(near)):
@@ -270,7 +270,7 @@ def _with_strips_of(rail: RailLine, support: Support | None) -> Support | None:
 
 def _unsupported(rail: RailLine, head_width_m: float) -> RailLine:
     """Mark a rail as supported nowhere."""
-    length_m = float(length_along(rail.xyz[:, :2])[-1])
+    length_m = rail.line.length_m
     t = stations_along(length_m)
     support = Support(t, np.zeros(len(t), dtype=int), np.full(len(t), unseen_m(head_width_m)))
     return replace(rail, gaps=np.array([[0.0, length_m]]), support=support)

@@ -15,7 +15,7 @@ from scipy.ndimage import gaussian_filter1d, uniform_filter1d
 from scipy.spatial import cKDTree
 
 from ..clouds.points import RailPoints
-from ..polyline import interpolate, left_normals, length_along, project
+from ..polyline import Polyline, interpolate, project
 from ..progress import SILENT, Progress
 from .level import AXIS_SHARE, MIN_NOISE_M, OFF_TOP_SIGMAS, cross_slope, robust_sigma, rough_level
 
@@ -117,7 +117,7 @@ class HeadPoints:
     @cached_property
     def along(self) -> np.ndarray:
         """Chainage of the vertices of the line, (k,)."""
-        return length_along(self.line)
+        return Polyline(self.line).t
 
     @property
     def length_m(self) -> float:
@@ -282,7 +282,7 @@ def free_edges(lines: Sequence[np.ndarray], head_width_m: float) -> list[np.ndar
     list of (2, s) bool arrays
         For each line, the right and the left edges at its stations.
     """
-    free = [np.ones((2, len(stations_along(length_along(line)[-1]))), dtype=bool) for line in lines]
+    free = [np.ones((2, len(stations_along(Polyline(line).length_m))), dtype=bool) for line in lines]
     for line, station, across in _close_runs(lines, BESIDE_HEADS * head_width_m):
         crossing = across.min() < -CROSSED_M and across.max() > CROSSED_M
         side = across if crossing else np.full(len(across), across.sum())
@@ -322,9 +322,8 @@ def _stations(lines: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray, np.n
     """Return line and station numbers, (k,), places and unit vectors to the left, (k, 2), of all stations."""
     columns = [(np.empty(0, int), np.empty(0, int), np.empty((0, 2)), np.empty((0, 2)))]
     for number, line in enumerate(lines):
-        along = length_along(line)
-        at = np.minimum(stations_along(along[-1]), along[-1])
-        places, normals = interpolate(line, along, at), interpolate(left_normals(line), along, at)
-        columns.append((np.full(len(at), number), np.arange(len(at)), places, normals))
+        own = Polyline(line)
+        at = np.minimum(stations_along(own.length_m), own.length_m)
+        columns.append((np.full(len(at), number), np.arange(len(at)), own.at(at), interpolate(own.normals, own.t, at)))
     numbers, stations, places, normals = (np.concatenate(column) for column in zip(*columns))
     return numbers, stations, places, normals

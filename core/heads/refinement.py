@@ -14,7 +14,7 @@ from ..clouds.points import RailPoints
 from ..lines.network import LineNetwork
 from ..lines.smoothing import bend_through
 from ..parameters import Parameters
-from ..polyline import left_normals, length_along
+from ..polyline import Polyline
 from ..progress import SILENT, Progress
 from .axis import CELL_M, Axis, unseen_m
 from .branch_starts import slide_branches
@@ -90,7 +90,7 @@ def _shifted(
         strips = measure_strips(head) if align else None
         own = on_own_level(strips.aligned(head) if strips else head)
         axis = Axis.of(own, unseen_m(cell_m), by_outline)
-        lines.append(line + axis.course.at(own.along)[:, None] * left_normals(line))
+        lines.append(line + axis.course.at(own.along)[:, None] * Polyline(line).normals)
     return _joined(network, lines, smoothing_m)
 
 
@@ -110,5 +110,5 @@ def _joined(network: LineNetwork, lines: list[np.ndarray], smoothing_m: float) -
         anchors[number].append((node, vertex % len(lines[number])))
     for line, own in zip(lines, anchors):
         own_nodes, vertices = np.array(own).T
-        bend_through(line, length_along(line) / smoothing_m, vertices, nodes[own_nodes])
+        bend_through(line, Polyline(line).t / smoothing_m, vertices, nodes[own_nodes])
     return replace(network, lines=tuple(lines), nodes=nodes)

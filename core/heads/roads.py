@@ -14,7 +14,7 @@ from scipy.ndimage import binary_opening
 
 from ..clouds.points import RailPoints
 from ..lines.smoothing import smooth_profile
-from ..polyline import interpolate, left_normals, project
+from ..polyline import Polyline
 from .head_points import HALF_HEAD_BINS, HALF_RANGE_BINS, STATION_STEP_M, HeadPoints, near_lines
 from .own_level import on_own_level
 
@@ -116,10 +116,10 @@ def _on_either_end(points: HeadPoints) -> _Band | None:
     line, along, stations, half_m = points.line, points.along, points.stations, 0.5 * points.width_m
     shifts = np.where(wide, left_m - half_m, 0.0), np.where(wide, right_m + half_m, 0.0)
     left, right = (
-        line + smooth_profile(stations, shift, SMOOTHING_M, along)[:, None] * left_normals(line) for shift in shifts
+        line + smooth_profile(stations, shift, SMOOTHING_M, along)[:, None] * Polyline(line).normals for shift in shifts
     )
     at = stations[wide & (stations <= along[-1])][:: int(PLACE_M / STATION_STEP_M)]
-    return _Band((left, right), (interpolate(left, along, at), interpolate(right, along, at)))
+    return _Band((left, right), (Polyline(left, along).at(at), Polyline(right, along).at(at)))
 
 
 def _at_gauge(
@@ -139,7 +139,7 @@ def _miss(places: np.ndarray, others: Sequence[np.ndarray], spacings_m: Sequence
     """Return by how much places on a rail, (k, 2), miss the distance of two rails, from the line that does least."""
     found = [np.inf]
     for other in others:
-        away_m = np.abs(project([other], places, max(spacings_m) + MAX_MISS_M).across)
+        away_m = np.abs(Polyline(other).feet(places, max(spacings_m) + MAX_MISS_M).across)
         if len(away_m):
             found.append(min(abs(float(np.median(away_m)) - spacing_m) for spacing_m in spacings_m))
     return min(found)

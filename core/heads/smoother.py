@@ -17,7 +17,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.linalg import cho_solve_banded, cholesky_banded
 
-from ..polyline import interpolate, left_normals, length_along
+from ..polyline import Polyline, interpolate
 
 KNOT_M = 0.5
 """Distance between the knots: a spline of this step follows waves of 2 m."""
@@ -218,9 +218,9 @@ def _trend(t: np.ndarray, values: np.ndarray, information: np.ndarray, places: n
 
 def _third_differences(line: np.ndarray, start_m: float, step_m: float, pieces: int) -> np.ndarray:
     """Return the third differences, to its left, of the coefficients of a line in plan, (k, 2), for each piece."""
-    along, knots = length_along(line), start_m + step_m * np.arange(pieces + 1)
-    curve = CubicSpline(knots, interpolate(line, along, knots), bc_type="natural")
-    normals = interpolate(left_normals(line), along, 0.5 * (knots[1:] + knots[:-1]))
+    own, knots = Polyline(line), start_m + step_m * np.arange(pieces + 1)
+    curve = CubicSpline(knots, own.at(knots), bc_type="natural")
+    normals = interpolate(own.normals, own.t, 0.5 * (knots[1:] + knots[:-1]))
     return 6 * step_m**3 * np.einsum("ij,ij->i", curve.c[0], normals)
 
 

@@ -15,7 +15,7 @@ from scipy.ndimage import maximum_filter1d, minimum_filter1d, uniform_filter1d
 from scipy.sparse.linalg import spsolve
 
 from ..parameters import Parameters
-from ..polyline import distance_to, interpolate, left_normals, length_along
+from ..polyline import Polyline, distance_to, interpolate
 from ..rails import Support
 from .edges import edge_middles
 from .head_points import HeadPoints
@@ -232,9 +232,9 @@ def _third_differences(line: np.ndarray, t: np.ndarray) -> np.ndarray:
     """Return the third differences, (n - 3,) metres to the left, of places `t`, (n,), on a line."""
     if len(t) < 4:
         return np.empty(0)
-    along = length_along(line)
-    places, normals = interpolate(line, along, t), interpolate(left_normals(line), along, t)
-    bends = np.einsum("ij,ij->i", np.diff(places, 2, axis=0), normals[1:-1])
+    own = Polyline(line)
+    normals = interpolate(own.normals, own.t, t[1:-1])
+    bends = np.einsum("ij,ij->i", np.diff(own.at(t), 2, axis=0), normals)
     return np.diff(bends)
 
 
@@ -314,8 +314,8 @@ def rows_of(lines: Sequence[np.ndarray], offsets: Sequence[StripOffsets | None])
     for line, own in zip(lines, offsets):
         if own is None:
             continue
-        along = length_along(line)
-        places, normals = interpolate(line, along, own.t), interpolate(left_normals(line), along, own.t)
+        along = Polyline(line)
+        places, normals = along.at(own.t), interpolate(along.normals, along.t, own.t)
         strip, station = np.nonzero(own.shown & (own.count >= 2))
         shift = own.across[strip, station, None] * normals[station]
         columns = places[station], own.strips[strip], shift, own.up[strip, station], own.points[strip, station]

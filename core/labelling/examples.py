@@ -15,8 +15,9 @@ from ..learned.examples import Examples, save_index, write_square
 from ..progress import SILENT, Progress
 from ..scratch import scratch_folder
 from ..squares.grid import Square
+from ..squares.store import files_of, read_stored
 from ..tasks import InTurn
-from .finding import files_of, read_square, sort_files
+from .finding import POINT, sort_files
 
 
 def write_examples(
@@ -52,7 +53,7 @@ def write_examples(
         keys = sorted({key for one in sorted_files for key in one.counts})
         entries = []
         for file, key in enumerate(cutting.follow(keys)):
-            points = read_square(files_of(key, sorted_files))
+            points = read_stored(files_of(key, sorted_files), POINT)
             rail = np.isin(points["mark"], rail_classes)
             tile = np.searchsorted(starts, points["number"], side="right")
             census += np.bincount(rail, minlength=2)

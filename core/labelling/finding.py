@@ -5,9 +5,7 @@ The files are read once; memory holds one square and its margin (docs/classifica
 
 from __future__ import annotations
 
-import uuid
-from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -19,14 +17,14 @@ from ..classify.sharpness import search_alike
 from ..classify.square import Classified, classify_square
 from ..clouds.points import Request, read_each
 from ..clouds.readers import CloudHeader, read_points, shows_scanner
-from ..disk import writing
 from ..errors import CloudError, NoRailPointsError, ParameterError
 from ..frame import LocalFrame
 from ..learned.model import Classifier
 from ..learned.square import label_square
 from ..progress import SILENT, Progress, counted
 from ..rails import ENOUGH_CELLS_PER_M, SearchFigures
-from ..squares.grid import Key, Square, points_by_square, unique_keys
+from ..squares.grid import Key, Square, Tiling
+from ..squares.store import SortedFile, append, counts_of, files_of, read_stored
 from ..standards import LAST_CLASS
 from ..tasks import Context, Runner, Task, in_listed_order
 
@@ -100,9 +98,7 @@ def find_rail_points(
     reading, searching = progress.divide((1.0, 3.0))
     request.announce(progress)
     sorted_files = sort_files(request, settings, folder, runner, reading)
-    counts: Counter[Key] = Counter()
-    for one in sorted_files:
-        counts.update(one.counts)
+    counts = counts_of(sorted_files)
     if not counts:
         raise _nothing_to_search(request, settings.guide)
     progress.status("Searching for rails")
@@ -208,22 +204,6 @@ def _as_from_images(request: Request) -> str:
     return " (it seems to be matched from images, for no point has an intensity, a GPS time or a second return)"
 
 
-@dataclass(frozen=True)
-class SortedFile:
-    """The points of one file of the cloud, sorted into squares.
-
-    Attributes
-    ----------
-    folder : str
-        Folder with one file for each square that has points inside or within `MARGIN_M`.
-    counts : dict of Key to int
-        Points inside each square.
-    """
-
-    folder: str
-    counts: dict[Key, int]
-
-
 def sort_files(
     request: Request, settings: Settings, folder: Path, runner: Runner, progress: Progress, with_class: bool = False
 ) -> list[SortedFile]:
@@ -242,13 +222,8 @@ def _sort_file(
     with_class: bool,
     context: Context,
 ) -> SortedFile:
-    """Append the points of a file that are to be searched to the files of their squares; a task.
-
-    Each execution has a folder of its own: a worker may have died half-way.
-    """
-    mine = Path(folder) / uuid.uuid4().hex
-    with writing(mine.parent):
-        mine.mkdir()
+    """Append the points of a file that are to be searched to the files of their squares; a task."""
+    mine, tiling = SortedFile.new_folder(Path(folder)), Tiling(settings.side_m, MARGIN_M)
     counts: dict[Key, int] = {}
     if settings.guide is not None and not settings.guide.reaches(*box_of(request, [header.extent])):
         return SortedFile(str(mine), counts)
@@ -257,7 +232,7 @@ def _sort_file(
         if settings.guide is not None:
             held = settings.guide.holds(places[:, :2])
             points, places = points[held], places[held]
-        keys, square = unique_keys(places, settings.side_m)
+        keys, square = tiling.keys(places)
         if len(keys) > MANY_SQUARES and len(points) < FEW_IN_SQUARE * len(keys):
             raise CloudError(
                 f"The points of {header.path.name} are too far apart for rails: if the coordinates are in centimetres "
@@ -265,7 +240,8 @@ def _sort_file(
             )
         for key, count in zip(keys, np.bincount(square).tolist()):
             counts[key] = counts.get(key, 0) + count
-        append(points, points_by_square(places, settings.side_m, MARGIN_M), mine)
+        for key, numbers in tiling.sort(places).items():
+            append(mine, key, points.take(numbers))  # which is four times as fast as an index
     return SortedFile(str(mine), counts)
 
 
@@ -284,26 +260,17 @@ def read_searched(
         yield points
 
 
-def append(points: np.ndarray, squares: Mapping[Key, np.ndarray], folder: Path) -> None:
-    """Append points, (n,) of POINT, to the files of their squares, given the numbers of those of each square."""
-    with writing(folder.parent):
-        for key, numbers in squares.items():
-            with file_of(folder, key).open("ab") as file:
-                file.write(points.take(numbers).data)  # which is four times as fast as an index
-
-
 def _search_task(key: Key, sorted_files: Sequence[SortedFile], zero: LocalFrame, settings: Settings) -> Task:
     """Make the task that searches a square."""
-    files = [str(file) for file in files_of(key, sorted_files)]
     weight = SEARCH_S * sum(one.counts.get(key, 0) for one in sorted_files)
-    arguments = (Square.on_grid(key, settings.side_m, zero), files, settings.at(key))
+    arguments = (Square.on_grid(key, settings.side_m, zero), files_of(key, sorted_files), settings.at(key))
     return Task(f"Searching square {key}", _search, arguments, weight=weight)
 
 
 def _search(square: Square, files: Sequence[str], settings: Settings, context: Context) -> Found:
     """Find the rail points of a square; a task."""
     context.progress.check()
-    points = read_square(files)
+    points = read_stored(files, POINT)
     found = search_square(square.frame.to_local(points["xyz"]), settings, context)
     points = points[found.rail]
     return Found(points["xyz"].copy(), points["number"].copy(), points["mark"].copy(), found.figures)
@@ -315,19 +282,3 @@ def search_square(xyz: np.ndarray, settings: Settings, context: Context) -> Clas
         return classify_square(xyz, settings)
     classifier = context.network(Classifier.of, settings.weights)
     return label_square(xyz, settings, classifier, context.progress)
-
-
-def files_of(key: Key, sorted_files: Sequence[SortedFile]) -> list[Path]:
-    """List the files that may hold points of a square."""
-    return [file_of(Path(one.folder), key) for one in sorted_files]
-
-
-def read_square(files: Sequence[str | Path]) -> np.ndarray:
-    """Read the points of a square and of its margin, (n,) array of POINT."""
-    parts = [np.empty(0, np.uint8), *(np.fromfile(file, np.uint8) for file in files if Path(file).exists())]
-    return np.concatenate(parts).view(POINT)  # joining bytes takes a fifth of the time that joining fields does
-
-
-def file_of(folder: Path, key: Key) -> Path:
-    """Return the file of a square."""
-    return folder / f"{key[0]}_{key[1]}"

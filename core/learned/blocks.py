@@ -13,7 +13,7 @@ import numpy as np
 
 from ..classify.bed import Bed, Coarse
 from ..classify.tops import HIGH_M, LOW_M, TOP_M
-from ..squares.grid import points_by_square
+from ..squares.grid import Tiling
 
 BLOCK_M = 4.0
 """Side of a block: it holds both rails of a track of any gauge."""
@@ -131,7 +131,6 @@ def cut(thinned: Thinned, side_m: float) -> list[Block]:
 
     Parameters
     ----------
-    thinned : Thinned
     side_m : float
         Side of the square.
     """
@@ -140,8 +139,8 @@ def cut(thinned: Thinned, side_m: float) -> list[Block]:
     inside = np.all((thinned.place[:, :2] >= 0) & (thinned.place[:, :2] < side_m), axis=1)
     labelled = inside & thinned.railhigh
     place = thinned.place[:, :2].astype(float)
-    own = {key: numbers[labelled[numbers]] for key, numbers in points_by_square(place, core_m).items()}
-    around = points_by_square(place, core_m, margin_m)
+    own = {key: numbers[labelled[numbers]] for key, numbers in Tiling(core_m).sort(place).items()}
+    around = Tiling(core_m, margin_m).sort(place)
     blocks = []
     for key, core in own.items():
         if len(core):

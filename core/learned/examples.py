@@ -41,7 +41,6 @@ class Examples:
 
     Attributes
     ----------
-    folder : Path
     index : (n,) array of ENTRY
     """
 
@@ -97,12 +96,10 @@ def write_square(
 
     Parameters
     ----------
-    folder : Path
     file : int
         Number of the square's file.
     key : tuple of int
         Column and row of the square.
-    side_m : float
     xyz : (n, 3) array
         See `classify.square.classify_square`.
     rail : (n,) bool array

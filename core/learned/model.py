@@ -95,7 +95,6 @@ class Classifier:
 
     Parameters
     ----------
-    network : RandLaNet
     device : {"AUTO", "CPU", "CUDA"}
 
     Raises

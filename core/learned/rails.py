@@ -33,7 +33,6 @@ def rails_of(xyz: np.ndarray, sure: np.ndarray, settings: Settings, reach_m: flo
         Metres from the square's corner.
     sure : (n,) bool array
         Points that the network labels. The others are kept if they lie on the axis of a rail of these.
-    settings : Settings
     reach_m : float
         Distance within which cells are compared.
 

@@ -39,9 +39,6 @@ def label_square(
     ----------
     xyz : (n, 3) array
         See `classify.square.classify_square`.
-    settings : Settings
-    classifier : Classifier
-    progress : Progress
     """
     by_shape = classify_square(xyz, settings)
     rail, figures = by_shape.flush.rail.copy(), by_shape.flush.figures

@@ -72,7 +72,6 @@ class Settings:
     ----------
     epochs : int
         How many times each block with rails is learned from.
-    seed : int
     start : Path, optional
         Weights to start from; None means random ones.
     """
@@ -150,13 +149,11 @@ class Trained:
 
     Attributes
     ----------
-    network : RandLaNet
     checks : tuple of Check
     by_tile : dict of int to Figures
         Of the blocks kept back, by tile of the cloud.
     blocks, kept_back : int
         Blocks learned from, and kept back.
-    steps : int
     """
 
     network: RandLaNet
@@ -184,8 +181,6 @@ def train(
 
     Parameters
     ----------
-    examples : Examples
-    settings : Settings
     folder : Path
         For the checkpoint.
     device : {"AUTO", "CPU", "CUDA"}

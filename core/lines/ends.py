@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..polyline import interpolate, left_normals, length_along
+from ..polyline import Polyline, interpolate
 
 STEP_M = 0.1
 """Spacing of even points. Vertices of a raster line are spaced by its corners, not by length."""
@@ -19,18 +19,17 @@ def turned(vertices: np.ndarray, end: int) -> np.ndarray:
 
 def even_points(line: np.ndarray, length_m: float = np.inf) -> np.ndarray:
     """Return points about every `STEP_M` along the first `length_m` of a line, (n, 2), at least two."""
-    along = length_along(line)
-    length_m = min(length_m, along[-1])
-    stations = np.linspace(0.0, length_m, max(int(length_m / STEP_M), 1) + 1)
-    return interpolate(line, along, stations)
+    own = Polyline(line)
+    length_m = min(length_m, own.length_m)
+    return own.at(np.linspace(0.0, length_m, max(int(length_m / STEP_M), 1) + 1))
 
 
 def cut_back(line: np.ndarray, length_m: float) -> np.ndarray:
     """Remove the first `length_m` of a line that is longer."""
     if length_m <= 0:
         return line
-    along = length_along(line)
-    return np.concatenate([interpolate(line, along, np.array([length_m])), line[along > length_m]])
+    own = Polyline(line)
+    return np.concatenate([own.at(np.array([length_m])), line[own.t > length_m]])
 
 
 def tip_and_direction(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -216,5 +215,5 @@ class PartingLaw:
 
 def left_of(line: np.ndarray, at: np.ndarray, left_m: np.ndarray) -> np.ndarray:
     """Return places, (k, 2), at chainages along a line, (n, 2), and distances to the left of it, (k,) metres each."""
-    along = length_along(line)
-    return interpolate(line, along, at) + left_m[:, None] * interpolate(left_normals(line), along, at)
+    own = Polyline(line)
+    return own.at(at) + left_m[:, None] * interpolate(own.normals, own.t, at)

@@ -15,7 +15,7 @@ from scipy.linalg import solveh_banded
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from ..parameters import Parameters
-from ..polyline import length_along, project, resample, runs
+from ..polyline import Polyline, project, runs
 from ..progress import Progress
 from ..rails import Centerline, RailLine, Support
 
@@ -37,7 +37,7 @@ def united(parts: Sequence[RailLine]) -> RailLine:
 
 def _with_figures(parts: Sequence[RailLine], xyz: np.ndarray) -> RailLine:
     """Combine the figures of the pieces as if the line, with vertices `xyz`, had been measured as a whole."""
-    lengths = [length_along(part.xyz[:, :2])[-1] for part in parts]
+    lengths = [part.line.length_m for part in parts]
     starts = np.concatenate([[0.0], np.cumsum(lengths)])
     points = np.array([part.points for part in parts], dtype=float)
     squares = np.array([part.resid_mm**2 for part in parts])
@@ -99,7 +99,7 @@ def finished(lines: Sequence[Line], parameters: Parameters, progress: Progress) 
     step_m = STEP_M if parameters.smoothing_xy_m >= SMOOTHED_M else ROUGH_STEP_M
     for line in lines:
         parts = parts_without_turns(line.xyz[:, :2], parameters.min_length_m, step_m)
-        whole = len(parts) == 1 and np.ptp(parts[0]) >= length_along(line.xyz[:, :2])[-1]
+        whole = len(parts) == 1 and np.ptp(parts[0]) >= line.line.length_m
         kept += [line] if whole else [line.part(*part) for part in parts]
         turned += [] if whole else [line]
     if turned:
@@ -121,14 +121,14 @@ def parts_without_turns(
     A line without such a place is a single part, however short. Parts shorter than `min_length_m` are left out, and so
     is a part that runs back over a longer one. Directions are measured between stations `step_m` apart.
     """
-    stations, t = resample(line, step_m)
-    sharp = _turns(stations, t) > np.radians(max_turn_deg)
+    stations = Polyline(line).resampled(step_m)
+    t, sharp = stations.t, _turns(stations) > np.radians(max_turn_deg)
     bends = [(float(t[first]), float(t[last + 1])) for first, last in runs(sharp)]
     if not bends:
         return [(0.0, float(t[-1]))]
     borders = [0.0, *(border for bend in bends for border in bend), float(t[-1])]
     parts = [(start, end) for start, end in zip(borders[::2], borders[1::2]) if end - start >= min_length_m]
-    drawn = {part: stations[(t >= part[0]) & (t <= part[1])] for part in parts}
+    drawn = {part: stations.xy[(t >= part[0]) & (t <= part[1])] for part in parts}
     kept: list[tuple[float, float]] = []
     for part in sorted(parts, key=lambda part: part[0] - part[1]):
         again = project([drawn[other] for other in kept], drawn[part], ON_ITSELF_M)
@@ -137,16 +137,11 @@ def parts_without_turns(
     return sorted(kept)
 
 
-def turn_deg(line: np.ndarray) -> float:
-    """Return the largest angle by which a line, (n, 2), turns within `TURN_M`, degrees."""
-    return float(np.degrees(_turns(*resample(line, STEP_M)).max()))
-
-
-def _turns(stations: np.ndarray, t: np.ndarray) -> np.ndarray:
+def _turns(stations: Polyline) -> np.ndarray:
     """Return the range of the directions within `TURN_M` of line around each section between stations, radians."""
-    ahead = np.diff(stations, axis=0)
+    ahead = np.diff(stations.xy, axis=0)
     direction = np.unwrap(np.arctan2(ahead[:, 1], ahead[:, 0]))
-    sections = int(round(TURN_M / t[1])) + 1
+    sections = int(round(TURN_M / stations.t[1])) + 1
     return maximum_filter1d(direction, sections) - minimum_filter1d(direction, sections)
 
 
@@ -215,7 +210,7 @@ def _fitted(xyz: np.ndarray, tolerance_xy_m: float, tolerance_z_m: float) -> np.
     if len(kept) < 3 or len(kept) == len(xyz):
         return xyz[kept]
     span = np.clip(np.searchsorted(kept, np.arange(len(xyz)), side="right") - 1, 0, len(kept) - 2)
-    along = length_along(xyz[:, :2])
+    along = Polyline(xyz).t
     share = (along - along[kept][span]) / (along[kept][span + 1] - along[kept][span])
     missing = xyz - _between(xyz[kept], span, share)
     moves = _least_squares(missing, span, share, np.gradient(along))

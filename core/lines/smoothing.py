@@ -15,7 +15,7 @@ from math import comb
 import numpy as np
 from scipy.special import factorial, gammainc
 
-from ..polyline import length_along
+from ..polyline import Polyline, length_along
 from ..progress import SILENT, Progress
 from .network import LineNetwork
 
@@ -259,7 +259,7 @@ def smooth_network(network: LineNetwork, sigma_m: float, progress: Progress = SI
     LineNetwork
         Lines with a vertex at each pass, and vertices at most an eighth of sigma apart.
     """
-    along = [length_along(line) for line in network.lines]
+    along = [Polyline(line).t for line in network.lines]
     anchor_line = np.concatenate([np.arange(2 * len(along)) // 2, network.passes[:, 1]])
     anchor_node = np.concatenate([network.ends.ravel(), network.passes[:, 0]])
     anchor_station = np.array(

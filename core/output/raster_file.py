@@ -43,7 +43,6 @@ class RasterHeader:
         One per band.
     frame : LocalFrame
         Its origin is the north-western corner of cell (0, 0) of the rasters.
-    cell_m : float
     window : tuple of int
         First row, first column, height and width of the part of the grid that the file covers, in cells.
     gauge_m, head_width_m : float or None
@@ -150,7 +149,6 @@ def header_for(
         Class of each raster.
     frame : LocalFrame
         Its origin is the corner of cell (0, 0).
-    standard : RailStandard
     extent : tuple of float, optional
         Extent to which the points were restricted.
     model : str
@@ -196,7 +194,6 @@ def write_rasters(path: Path, header: RasterHeader, rasters: Sequence[RailRaster
     ----------
     path : Path
         New file.
-    header : RasterHeader
     rasters : sequence of RailRaster
         On the grid of the header.
 

@@ -40,7 +40,6 @@ def write_layers(layers: Sequence[Layer], destination: Destination, frame: Local
     ----------
     layers : sequence of Layer
         Only the first of them goes into a DXF or CSV file.
-    destination : Destination
     frame : LocalFrame
         Local frame of the layers.
 
@@ -56,12 +55,6 @@ def write_layers(layers: Sequence[Layer], destination: Destination, frame: Local
     with destination.replacing(edit=bool(tables_in(destination.file) - names)) as new:
         for layer in layers:
             _write_layer(layer, frame, new)
-
-
-def write_all(layers: Sequence[Layer], outputs: Mapping[str, Destination], frame: LocalFrame) -> None:
-    """Write layers into the GeoPackages of the outputs of their names."""
-    for same, file in by_file(layers, outputs):
-        write_layers(same, file, frame)
 
 
 def _write_for_others(layer: Layer, destination: Destination, frame: LocalFrame) -> None:

@@ -88,7 +88,6 @@ def airborne_page(survey: Survey, source: str, facts: Mapping[str, str]) -> str:
 
     Parameters
     ----------
-    survey : Survey
     source : str
         Name of the cloud.
     facts : mapping of str to str

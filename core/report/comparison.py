@@ -32,7 +32,6 @@ def build_comparison(found: TrackComparison, counts_shift: bool, source: str, fa
 
     Parameters
     ----------
-    found : TrackComparison
     counts_shift : bool
         Whether the constant shift counts as a movement.
     source : str

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..checks.doubts import find_jumps
-from ..polyline import interpolate, length_along, project
+from ..polyline import Polyline
 from ..rails import STRIP_OFF_M, Centerline, HeadWidths, RailLine, RailNetwork, TrackGeometry, cell_borders
 
 GAUGE_OFF_MM = 10.0
@@ -72,8 +72,6 @@ class Place:
 
     Attributes
     ----------
-    track_id : int
-    doubt : Doubt
     start_m, end_m : float
         Chainages.
     length_m : float
@@ -93,8 +91,6 @@ class TrackFindings:
 
     Attributes
     ----------
-    line : Centerline
-    geometry : TrackGeometry
     nominal_mm : float
         Nearest of the gauges that tracks may have.
     doubtful : dict of Doubt to (n,) bool array
@@ -137,7 +133,6 @@ class Hole:
     ----------
     first, second : int
         Numbers of the tracks.
-    length_m : float
     ends : (2, 3) array
         Ends of the tracks, local metres.
     """
@@ -277,9 +272,9 @@ def _outward(end: np.ndarray) -> np.ndarray:
 
     An arc through the end, the middle and the last of them gives the direction at the end itself.
     """
-    along = length_along(end[:, :2])
-    reach_m = min(END_M, float(along[-1]))
-    near, far = interpolate(end[:, :2], along, np.array([reach_m / 2, reach_m]))
+    line = Polyline(end[:, :2])
+    reach_m = min(END_M, line.length_m)
+    near, far = line.at(np.array([reach_m / 2, reach_m]))
     outward = 3 * end[0, :2] - 4 * near + far
     return outward / np.hypot(*outward)
 
@@ -291,9 +286,7 @@ def _angle(one: np.ndarray, other: np.ndarray) -> float:
 
 def _is_met(place: np.ndarray, number: int, lines: Sequence[Centerline]) -> bool:
     """Return whether another track passes an end of track `number` or begins there."""
-    return any(
-        len(project([line.xyz[:, :2]], place[None], 1.0).t) > 0 for other, line in enumerate(lines) if other != number
-    )
+    return any(len(line.line.feet(place[None], 1.0).t) > 0 for other, line in enumerate(lines) if other != number)
 
 
 def _examine_track(

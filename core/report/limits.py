@@ -57,7 +57,6 @@ class Quantity:
     ----------
     name : str
         Connects its input with its rows in the page.
-    label : str
     limit_mm : float or None
         Limit of the run; None if there is none.
     """

@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 
 from ..checks.doubts import ARM_M
-from ..polyline import length_along
 from ..progress import counted
 from ..rails import RailLine, RailNetwork, TrackGeometry
 from .findings import (
@@ -56,7 +55,6 @@ class Finding:
 
     Attributes
     ----------
-    reason : str
     xyz : (n, 3) array
         The section in local metres.
     harm : float
@@ -193,7 +191,7 @@ def _of_hole(hole: Hole) -> Finding:
 
 
 def _of_lone_rail(rail: RailLine) -> Finding:
-    plan_m = float(length_along(rail.xyz[:, :2])[-1])
+    plan_m = rail.line.length_m
     return Finding(
         LONE_RAIL,
         rail.xyz,

@@ -87,7 +87,6 @@ def tag(name: str, *content: str, **attributes: object) -> str:
 
     Parameters
     ----------
-    name : str
     *content : str
         Markup; escape plain text with `text`.
     **attributes : object

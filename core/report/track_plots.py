@@ -107,7 +107,6 @@ def draw_profiles(track: TrackFindings, height_m: np.ndarray) -> str:
 
     Parameters
     ----------
-    track : TrackFindings
     height_m : (n,) array
         Heights of the stations above the cloud's datum.
     """

@@ -31,7 +31,6 @@ def build_card(trained: Trained, tiles: Sequence[str], facts: Mapping[str, str])
 
     Parameters
     ----------
-    trained : Trained
     tiles : sequence of str
         Names of the files of the cloud, by number.
     facts : mapping of str to str

@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 
 from ..clouds.points import AIRBORNE, RailPoints
 from ..errors import CloudError
-from ..polyline import length_along, project, runs
+from ..polyline import project, runs
 from ..progress import SILENT, Progress
 from ..rails import RailLine
 from .grid import PointSource, Square, around, lay_out
@@ -108,7 +108,7 @@ def warn_of_unexplained(source: PointSource, rails: Sequence[RailLine], progress
 
 def warn_of_airborne(source: PointSource, rails: Sequence[RailLine], progress: Progress = SILENT) -> None:
     """Warn the user if rails were drawn from as few points as airborne clouds have on them; parameters as above."""
-    length_m = sum(float(length_along(rail.xyz[:, :2])[-1]) for rail in rails)
+    length_m = sum(rail.line.length_m for rail in rails)
     per_metre = sum(source.counts.values()) / length_m
     if per_metre < AIRBORNE_PER_METRE:
         progress.warning(

@@ -121,7 +121,7 @@ class MemorySource:
         points = heads_of(points)
         self.frame, self.class_code, self.side_m = points.frame, points.class_code, side_m
         origin = Square.on_grid((0, 0), side_m, points.frame).frame.shift_to(points.frame)
-        self._points, self._members = points, points_by_square(points.xyz - origin, side_m)
+        self._points, self._members = points, Tiling(side_m).sort(points.xyz - origin)
         self.counts = {key: len(part) for key, part in self._members.items()}
         self.span_m = float(np.ptp(points.xyz[:, :2], axis=0).max()) if len(points.xyz) else 0.0
 
@@ -146,18 +146,57 @@ class MemorySource:
         return self
 
 
-def unique_keys(xyz_m: np.ndarray, side_m: float) -> tuple[list[Key], np.ndarray]:
-    """Find the squares of a side in which points, (n, 2) or (n, 3) metres from the zero of the coordinate system, are.
+@dataclass(frozen=True)
+class Tiling:
+    """A division of the plane into squares, from the zero of the coordinate system.
 
-    Returns the squares, in ascending order, and for each point the number of its square among them, (n,).
+    Attributes
+    ----------
+    side_m : float
+    margin_m : float
+        Distance, less than half a side, beyond the border of a square up to which points belong to it as well.
     """
-    if not len(xyz_m):
-        return [], np.empty(0, dtype=np.int64)
-    column, row = (np.floor(values / side_m).astype(np.int64) for values in xyz_m[:, :2].T)
-    first_column, first_row, height = int(column.min()), int(row.min()), int(np.ptp(row)) + 1
-    square = (column - first_column) * height + row - first_row
-    found, number = _distinct(square, (int(column.max()) - first_column + 1) * height)
-    return [(first_column + one // height, first_row + one % height) for one in found.tolist()], number
+
+    side_m: float
+    margin_m: float = 0.0
+
+    def keys(self, xyz_m: np.ndarray) -> tuple[list[Key], np.ndarray]:
+        """Find the squares in which points, (n, 2) or (n, 3) metres from the zero of the coordinate system, are.
+
+        Returns the squares, in ascending order, and for each point the number of its square among them, (n,).
+        """
+        if not len(xyz_m):
+            return [], np.empty(0, dtype=np.int64)
+        column, row = (np.floor(values / self.side_m).astype(np.int64) for values in xyz_m[:, :2].T)
+        first_column, first_row, height = int(column.min()), int(row.min()), int(np.ptp(row)) + 1
+        square = (column - first_column) * height + row - first_row
+        found, number = _distinct(square, (int(column.max()) - first_column + 1) * height)
+        return [(first_column + one // height, first_row + one % height) for one in found.tolist()], number
+
+    def sort(self, xyz_m: np.ndarray) -> dict[Key, np.ndarray]:
+        """Sort points, (n, 2) or (n, 3) metres from the zero of the coordinate system, into squares.
+
+        Returns the numbers of the points of each square, ascending without a margin; squares are in ascending order.
+        """
+        number = np.arange(len(xyz_m))
+        if self.margin_m:
+            xyz_m, number = self._with_margin(xyz_m[:, :2])
+        keys, square = self.keys(xyz_m)
+        # Sorting small numbers takes linear time.
+        order = np.argsort(square.astype(np.min_scalar_type(len(keys))), kind="stable")
+        borders = np.searchsorted(square[order], np.arange(1, len(keys)))
+        return dict(zip(keys, np.split(number[order], borders)))
+
+    def _with_margin(self, xy_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Repeat places near the borders of squares, moved into each square that they belong to, and their numbers."""
+        xy_m = np.ascontiguousarray(xy_m.T)
+        low, high = (np.floor((xy_m + out) / self.side_m) for out in (-self.margin_m, self.margin_m))
+        crosses = low != high
+        moved, number = [xy_m - self.margin_m], [np.arange(xy_m.shape[1])]
+        for chosen, sense in ((crosses[0], (1, -1)), (crosses[1], (-1, 1)), (crosses.all(axis=0), (1, 1))):
+            number.append(np.flatnonzero(chosen))
+            moved.append(xy_m[:, number[-1]] + np.multiply(sense, self.margin_m)[:, None])
+        return np.concatenate(moved, axis=1).T, np.concatenate(number)
 
 
 def _distinct(numbers: np.ndarray, limit: int) -> tuple[np.ndarray, np.ndarray]:
@@ -167,44 +206,6 @@ def _distinct(numbers: np.ndarray, limit: int) -> tuple[np.ndarray, np.ndarray]:
         return found, index.ravel()
     there = np.bincount(numbers, minlength=limit) > 0
     return np.flatnonzero(there), (np.cumsum(there) - 1)[numbers]
-
-
-def points_by_square(xyz_m: np.ndarray, side_m: float, margin_m: float = 0.0) -> dict[Key, np.ndarray]:
-    """Sort points into squares.
-
-    Parameters
-    ----------
-    xyz_m : (n, 2) or (n, 3) array
-        Metres from the zero of the coordinate system.
-    side_m : float
-        Side of the squares.
-    margin_m : float
-        Distance, less than half a side, beyond the border of a square up to which points belong to it as well.
-
-    Returns
-    -------
-    dict of Key to (k,) int array
-        Numbers of the points of each square, ascending without a margin; the squares are in ascending order.
-    """
-    number = np.arange(len(xyz_m))
-    if margin_m:
-        xyz_m, number = _with_margin(xyz_m[:, :2], side_m, margin_m)
-    keys, square = unique_keys(xyz_m, side_m)
-    # Sorting small numbers takes linear time.
-    order = np.argsort(square.astype(np.min_scalar_type(len(keys))), kind="stable")
-    borders = np.searchsorted(square[order], np.arange(1, len(keys)))
-    return dict(zip(keys, np.split(number[order], borders)))
-
-
-def _with_margin(xy_m: np.ndarray, side_m: float, margin_m: float) -> tuple[np.ndarray, np.ndarray]:
-    """Repeat places near the borders of squares, moved into each square that they belong to, and their numbers."""
-    xy_m = np.ascontiguousarray(xy_m.T)
-    crosses = np.floor((xy_m - margin_m) / side_m) != np.floor((xy_m + margin_m) / side_m)
-    moved, number = [xy_m - margin_m], [np.arange(xy_m.shape[1])]
-    for chosen, sense in ((crosses[0], (1, -1)), (crosses[1], (-1, 1)), (crosses.all(axis=0), (1, 1))):
-        number.append(np.flatnonzero(chosen))
-        moved.append(xy_m[:, number[-1]] + np.multiply(sense, margin_m)[:, None])
-    return np.concatenate(moved, axis=1).T, np.concatenate(number)
 
 
 def around(key: Key) -> list[Key]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..frame import LocalFrame
 from ..lines.finishing import SAME_RAIL_M
-from ..polyline import interpolate, length_along, project, resample, runs
+from ..polyline import Polyline, interpolate, project, runs
 from ..rails import RailLine
 from .grid import HALO_M, Square
 
@@ -63,7 +63,8 @@ def trim(rails: Sequence[RailLine], square: Square, strips: np.ndarray = NO_STRI
     """Cut the lines of a square, in its local metres, where they stop being valid, and keep the strips inside."""
     parts: list[RailLine] = []
     for rail in rails:
-        stations, t = resample(rail.xyz[:, :2], CUT_STEP_M)
+        cut = rail.line.resampled(CUT_STEP_M)
+        stations, t = cut.xy, cut.t
         valid = square.holds(stations, HALO_M)
         if valid.all():
             found = [(rail, square.holds(stations))]
@@ -107,8 +108,7 @@ class Piece:
 
     def place(self, side: int) -> np.ndarray:
         """Return the position of one end, (2,)."""
-        along = length_along(self.rail.xyz[:, :2])
-        return interpolate(self.rail.xyz[:, :2], along, np.array([self.chainage(side)]))[0]
+        return self.rail.line.at(np.array([self.chainage(side)]))[0, :2]
 
     def chainage(self, side: int) -> float:
         """Return the chainage of one end."""
@@ -142,7 +142,8 @@ def new_parts(
     Given are these lines, (n, 2) each, whether the rail was `cut` at its start and at its end, and the corner of the
     square, (2,), in the frame of the rail.
     """
-    stations, t = resample(rail.xyz[:, :2], CUT_STEP_M)
+    line = rail.line.resampled(CUT_STEP_M)
+    stations, t = line.xy, line.t
     seen = np.zeros(len(t), dtype=bool)
     shared = np.flatnonzero(~square.holds(stations - corner, -HALO_M))
     seen[shared[project(known, stations[shared], SAME_RAIL_M).point]] = True
@@ -179,32 +180,32 @@ def blended(part: RailLine, side: int, following: RailLine) -> RailLine:
     the start (`side` 0) or the end (1).
     """
     xyz = (part.xyz if side else part.xyz[::-1]).copy()
-    along = length_along(xyz[:, :2])
+    along = Polyline(xyz).t
     share = 1.0 - np.clip((along[-1] - along) / min(2 * HALO_M, along[-1]), 0.0, 1.0)
     last = np.flatnonzero(share > 0)
-    target_line = following.xyz
-    feet = project([target_line[:, :2]], xyz[last, :2], SAME_RAIL_M)
+    target_line = following.line
+    feet = target_line.feet(xyz[last, :2], SAME_RAIL_M)
     if not len(feet.point):
         target_line = extended(following.xyz)
-        feet = project([target_line[:, :2]], xyz[last, :2], SAME_RAIL_M)
+        feet = target_line.feet(xyz[last, :2], SAME_RAIL_M)
     if len(feet.point):
         order = np.argsort(feet.point)
         shown = last[feet.point[order]]
-        target = interpolate(target_line, length_along(target_line[:, :2]), feet.t[order])
+        target = target_line.at(feet.t[order])
         offset = interpolate(target - xyz[shown], along[shown], along[last])
         xyz[last] += smooth_step(share[last])[:, None] * offset
     return replace(part, xyz=xyz if side else xyz[::-1])
 
 
-def extended(line: np.ndarray) -> np.ndarray:
+def extended(xyz: np.ndarray) -> Polyline:
     """Extend a line, (n, 2) or (n, 3), by `HOLE_M` at both ends, with the curvature it has there."""
-    along = length_along(line[:, :2])
+    line = Polyline(xyz)
     out = np.arange(1, HOLE_STATIONS + 1) * CUT_STEP_M
     ends = [
-        3 * line[end] - 3 * interpolate(line, along, abs(side - out)) + interpolate(line, along, abs(side - 2 * out))
-        for end, side in ((0, 0.0), (-1, along[-1]))
+        3 * xyz[end] - 3 * line.at(abs(side - out)) + line.at(abs(side - 2 * out))
+        for end, side in ((0, 0.0), (-1, line.length_m))
     ]
-    return np.concatenate([ends[0][::-1], line, ends[1]])
+    return Polyline(np.concatenate([ends[0][::-1], xyz, ends[1]]))
 
 
 def smooth_step(share: np.ndarray) -> np.ndarray:

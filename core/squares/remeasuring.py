@@ -12,12 +12,12 @@ from ..heads.elevation import measure_again
 from ..heads.head_points import Widths
 from ..lines.finishing import united
 from ..lines.smoothing import GAP_SIGMAS
-from ..polyline import length_along, resample, runs
+from ..polyline import runs
 from ..progress import SILENT, Progress
 from ..rails import RailLine
 from ..tasks import Context, Runner, Task
 from ..tracks.geometry import PROFILE_SIGMA_M
-from .grid import Key, PointSource, Square, lay_out, unique_keys
+from .grid import Key, PointSource, Square, Tiling, lay_out
 
 CONTEXT_M = 10.0
 """Distance beyond a square over which its rails are measured as well: the disc reaches 1 m, and what is further away
@@ -105,7 +105,7 @@ def _with_context(rail: RailLine, section: Section, square: Square, source: Poin
 
 def _straight_across_gaps(rail: RailLine) -> RailLine:
     """Interpolate heights across long gaps, as an undivided profile does; a square may show only one side of a gap."""
-    t, xyz = length_along(rail.xyz[:, :2]), rail.xyz.copy()
+    t, xyz = rail.line.t, rail.xyz.copy()
     for start, end in rail.gaps:
         if end - start > GAP_SIGMAS * PROFILE_SIGMA_M and start > 0 and end < t[-1]:
             inside = (t > start) & (t < end)
@@ -124,11 +124,12 @@ def _sections(
     for number, rail in enumerate(rails):
         if rail.class_code != source.class_code:
             continue
-        stations, t = resample(rail.xyz[:, :2], LOOKUP_STEP_M)
+        stations = rail.line.resampled(LOOKUP_STEP_M)
+        t = stations.t
         if whole is not None:
             sections[whole].append((number, 0.0, float(t[-1])))
             continue
-        keys, index = unique_keys(stations - zero[:2], source.side_m)
+        keys, index = Tiling(source.side_m).keys(stations.xy - zero[:2])
         for place, key in enumerate(keys):
             for first, last in runs(index == place):
                 start = 0.0 if first == 0 else 0.5 * (t[first - 1] + t[first])

@@ -16,7 +16,6 @@ from scipy.spatial import cKDTree
 
 from ..frame import LocalFrame
 from ..lines.finishing import SAME_RAIL_M, united
-from ..polyline import interpolate, length_along, project
 from ..rails import RailLine
 from .grid import HALO_M, Key, Square, around
 from .pieces import (
@@ -73,7 +72,7 @@ class _Joiner:
         ends, places = self._open_ends([number for key in earlier for number in self._numbers[key]], square, corner)
         count_before = len(self._pieces)
         for rail in rails:
-            feet = project([extended(rail.xyz[:, :2])], places, SAME_RAIL_M)
+            feet = extended(rail.xyz[:, :2]).feet(places, SAME_RAIL_M)
             on_rail = [(ends[point], t - HOLE_M) for point, t in zip(feet.point, feet.t)]
             cut = ~square.holds(rail.xyz[[0, -1], :2] - corner, HALO_M - CUT_STEP_M)
             for start, end in new_parts(rail, known, cut, square, corner):
@@ -95,7 +94,7 @@ class _Joiner:
         """Add a piece and link its cut ends to the open ends on its rail, given with their chainages."""
         number, piece = len(self._pieces), Piece(rail, start, end)
         self._pieces.append(piece)
-        length = float(length_along(rail.xyz[:, :2])[-1])
+        length = rail.line.length_m
         inner = [side for side, is_inner in enumerate((start > 0, end < length)) if is_inner]
         for side in [*inner, *(side for side in np.flatnonzero(cut).tolist() if side not in inner)]:
             self._link(number, side, on_rail)
@@ -117,7 +116,7 @@ class _Joiner:
         if away <= LINK_M:
             piece.links[side] = end
             self._pieces[end[0]].links[end[1]] = (number, side)
-            length = length_along(piece.rail.xyz[:, :2])[-1]
+            length = piece.rail.line.length_m
             piece.move_end(side, float(np.clip(chainage, 0.0, length)))
 
     def lines(self) -> list[RailLine]:
@@ -162,7 +161,7 @@ def _extend_to_end_of_rail(piece: Piece, side: int, length: float) -> None:
 
 def closed_ring(line: RailLine) -> RailLine:
     """Make the ends of a ring coincide: their difference is spread over twice `HALO_M` on either side."""
-    along = length_along(line.xyz[:, :2])
+    along = line.line.t
     offset = line.xyz[-1] - line.xyz[0]
     if along[-1] <= 4 * HALO_M or np.hypot(*offset[:2]) > SAME_RAIL_M:
         return line
@@ -197,11 +196,11 @@ def _reattached(lines: Sequence[RailLine], nodes: np.ndarray) -> list[RailLine]:
 def _attached(branch: RailLine, side: int, through: RailLine) -> tuple[RailLine, RailLine]:
     """Move the end of a branch onto a through line and give that line a vertex there, if the end is close to it."""
     place = branch.xyz[side]
-    feet = project([through.xyz[:, :2]], place[None, :2], SAME_RAIL_M)
+    feet = through.line.feet(place[None, :2], SAME_RAIL_M)
     if not len(feet.t):
         return branch, through
-    along = length_along(through.xyz[:, :2])
-    vertex = interpolate(through.xyz, along, feet.t)[0]
+    along = through.line.t
+    vertex = through.line.at(feet.t)[0]
     nearest = int(np.argmin(np.abs(along - feet.t[0])))
     if abs(along[nearest] - feet.t[0]) <= SAME_RAIL_M:
         vertex = through.xyz[nearest]

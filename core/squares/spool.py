@@ -24,7 +24,8 @@ from ..frame import LocalFrame
 from ..heads.on_heads import heads_of
 from ..progress import SILENT, Progress
 from ..scratch import discard, scratch_folder
-from .grid import Key, Square, around, points_by_square
+from .grid import Key, Square, Tiling, around
+from .store import append
 
 REPORT = "report.json"
 
@@ -268,11 +269,10 @@ class Census:
         mine = self._classes.setdefault(code, new)
         for mark in np.unique(marks).tolist():
             own = xyz[marks == mark]
-            for key, numbers in points_by_square(zero.to_local(own), side_m).items():
-                name, data = f"{code}_{key[0]}_{key[1]}_{mark}", own[numbers].tobytes()
-                with (folder / name).open("ab") as file:
-                    file.write(data)
-                mine["checks"][name] = zlib.crc32(data, mine["checks"].get(name, 0))
+            for key, numbers in Tiling(side_m).sort(zero.to_local(own)).items():
+                points = own[numbers]
+                name = append(folder, (code, *key, mark), points)
+                mine["checks"][name] = zlib.crc32(points.data, mine["checks"].get(name, 0))
                 mine["squares"][name] = mine["squares"].get(name, 0) + len(numbers)
         mine["low"] = np.minimum(mine["low"], xyz[:, :2].min(axis=0)).tolist()
         mine["high"] = np.maximum(mine["high"], xyz[:, :2].max(axis=0)).tolist()

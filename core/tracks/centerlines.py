@@ -11,7 +11,7 @@ from ..errors import NoTrackError
 from ..lines.finishing import finished, united
 from ..lines.smoothing import STATIONS_PER_SIGMA, smooth_line
 from ..parameters import Parameters
-from ..polyline import MIN_RING_M, is_closed, left_normals, length_along, resample, starts_at_its_end
+from ..polyline import MIN_RING_M, Polyline
 from ..progress import SILENT, Progress
 from ..rails import Centerline, RailLine
 from ..standards import closest_standard, distinct_gauges
@@ -125,7 +125,7 @@ def build_centerlines(
 
 def _in_order(rails: Sequence[RailLine]) -> list[RailLine]:
     """Sort rails by place and turn them to start in the west: tracks must not depend on the order of the rails."""
-    turned = [rail.reversed() if starts_at_its_end(rail.xyz) else rail for rail in rails]
+    turned = [rail.reversed() if rail.line.starts_at_its_end else rail for rail in rails]
     return started_abreast(sorted(turned, key=lambda rail: (*rail.xyz[0, :2], *rail.xyz[-1, :2], rail.length_m)))
 
 
@@ -146,8 +146,9 @@ def _draw(rails: Sequence[RailLine], chain: Chain, parameters: Parameters) -> Ce
     """Draw the centerline of one track; None if its rails are nowhere opposite each other."""
     spacing_m = parameters.gauge_m + parameters.head_width_m
     reach_m, tolerance_m = single_rail_limit(parameters.max_gap_m), parameters.centerline_tolerance_m
-    stations, _ = resample(provisional_centerline(rails, chain, spacing_m / 2, reach_m), PROVISIONAL_STEP_M)
-    normals = left_normals(stations)
+    provisional = Polyline(provisional_centerline(rails, chain, spacing_m / 2, reach_m))
+    drawn = Polyline(provisional.resampled(PROVISIONAL_STEP_M).xyz)
+    stations, normals = drawn.xyz, drawn.normals
     spans = (
         _spans((pair.left, pair.left_span) for pair in chain.pairs),
         _spans((pair.right, pair.right_span) for pair in chain.pairs),
@@ -166,12 +167,12 @@ def _draw(rails: Sequence[RailLine], chain: Chain, parameters: Parameters) -> Ce
     cant = (left.height_m - right.height_m)[both]
     gauge = np.hypot(apart[both], np.nan_to_num(cant)) - parameters.head_width_m
     numbers = {number for side in spans for number, _ in side}
-    if all(is_closed(rails[number].xyz) for number in numbers):
+    if all(rails[number].line.is_closed for number in numbers):
         xyz = closed_centerline(xyz)
     xyz = _smoothed(xyz, parameters.smoothing_xy_m)
-    bridged_m = float(bridged_steps(rails, left, right, length_along(stations)).sum())
+    bridged_m = float(bridged_steps(rails, left, right, drawn.t).sum())
     ids = [tuple(dict.fromkeys(rails[number].rail_id for number, _ in side)) for side in spans]
-    if starts_at_its_end(xyz):
+    if Polyline(xyz).starts_at_its_end:
         xyz, cant, ids = xyz[::-1], -cant, [side[::-1] for side in ids[::-1]]
     return Centerline(
         xyz=xyz,
@@ -200,11 +201,11 @@ def _spans(sections: Iterable[tuple[int, tuple[float, float]]]) -> list[tuple[in
 
 def _smoothed(xyz: np.ndarray, smoothing_m: float) -> np.ndarray:
     """Smooth a centerline, (n, 3), in plan, with vertices as close as its shape requires."""
-    stations, t = resample(xyz, smoothing_m / STATIONS_PER_SIGMA)
-    closed = is_closed(xyz)
+    line = Polyline(xyz)
+    stations, closed = line.resampled(smoothing_m / STATIONS_PER_SIGMA), line.is_closed
     # The ends are free, because rails are smooth already and a fixed end would straighten a curve.
-    plan = smooth_line(xyz[:, :2], smoothing_m, t, ends="free", closed=closed)
-    smooth = np.column_stack([plan, stations[:, 2]])
+    plan = smooth_line(line.xy, smoothing_m, stations.t, ends="free", closed=closed)
+    smooth = np.column_stack([plan, stations.xyz[:, 2]])
     return np.concatenate([smooth[:-1], smooth[:1]]) if closed else smooth
 
 
@@ -213,25 +214,25 @@ def started_abreast(rails: Sequence[RailLine]) -> list[RailLine]:
 
     The rails of a track then start on a common normal, wherever they started before.
     """
-    place = next((rail.xyz[0, :2] for rail in rails if is_closed(rail.xyz)), None)
+    place = next((rail.xyz[0, :2] for rail in rails if rail.line.is_closed), None)
     if place is None:
         return list(rails)
-    return [_started_near(rail, place) if is_closed(rail.xyz) else rail for rail in rails]
+    return [_started_near(rail, place) if rail.line.is_closed else rail for rail in rails]
 
 
 def _started_near(rail: RailLine, place: np.ndarray) -> RailLine:
     """Move the start of a closed rail to the place nearest to a given one, (2,)."""
-    stations, t = resample(rail.xyz[:, :2], START_STEP_M)
-    start = t[np.argmin(np.linalg.norm(stations - place, axis=1))]
-    if start in (0.0, t[-1]):
+    stations = rail.line.resampled(START_STEP_M)
+    start, end = stations.t[np.argmin(np.linalg.norm(stations.xy - place, axis=1))], stations.t[-1]
+    if start in (0.0, end):
         return rail
-    return united([rail.between(start, t[-1]), rail.between(0.0, start)])
+    return united([rail.between(start, end), rail.between(0.0, start)])
 
 
 def closed_centerline(xyz: np.ndarray) -> np.ndarray:
     """Close a centerline, (n, d), drawn along closed rails if its ends are close together."""
     away = np.linalg.norm(xyz[:, :2] - xyz[0, :2], axis=1)
-    along = length_along(xyz[:, :2])
+    along = Polyline(xyz).t
     if away[-1] > MAX_SEAM_M or along[-1] <= MIN_RING_M:
         return xyz
     ahead = (xyz[:, :2] - xyz[0, :2]) @ (xyz[1, :2] - xyz[0, :2])

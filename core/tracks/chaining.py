@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..polyline import interpolate, left_normals, length_along
+from ..polyline import Polyline
 from ..rails import RailLine
 from .pairing import LEFT, MAX_OVERLAP_M, MIN_SECTION_M, RIGHT, RailPair
 
@@ -234,39 +234,35 @@ class RailAhead:
 
     Attributes
     ----------
-    line : (n, 2) array
+    line : Polyline
         The rail in plan.
-    along : (n,) array
-        Chainage of its vertices.
     end_m : float
         Chainage of the end of the section.
     sense : int
         1 if chainages increase outwards, otherwise -1.
     """
 
-    line: np.ndarray
-    along: np.ndarray
+    line: Polyline
     end_m: float
     sense: int
 
     @classmethod
     def of(cls, rail: RailLine, span: tuple[float, float], end: int) -> RailAhead:
         """Return a rail seen from the start (`end` 0) or from the end (1) of a section, given by its chainages."""
-        line = rail.xyz[:, :2]
-        return cls(line, length_along(line), span[end], 1 if span[end] > span[1 - end] else -1)
+        return cls(Polyline(rail.xyz[:, :2]), span[end], 1 if span[end] > span[1 - end] else -1)
 
     @property
     def beyond_m(self) -> float:
         """Length of the rail beyond the section."""
-        return float(self.along[-1] - self.end_m if self.sense > 0 else self.end_m)
+        return float(self.line.length_m - self.end_m if self.sense > 0 else self.end_m)
 
     def at(self, ahead_m: np.ndarray, left_m: float = 0.0) -> np.ndarray:
         """Return places along the rail, (n, 2), beyond the end of the section, and offset to the left as seen outwards.
 
         Negative distances are inside the section.
         """
-        places = interpolate(self.line, self.along, self.end_m + self.sense * ahead_m)
-        return places + left_m * left_normals(places) if left_m else places
+        places = self.line.at(self.end_m + self.sense * ahead_m)
+        return places + left_m * Polyline(places).normals if left_m else places
 
 
 def rails_ahead(rails: Sequence[RailLine], pair: RailPair, end: int) -> tuple[RailAhead, RailAhead]:

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..lines.ends import ARC, STRAIGHT, PartingLaw, left_of
-from ..polyline import length_along, project, resample
+from ..polyline import Polyline
 from ..progress import SILENT, Progress
 from ..rails import Centerline
 
@@ -98,7 +98,7 @@ def _near_ends(lines: Sequence[Centerline]) -> Iterator[tuple[int, int, int]]:
     """Yield the ends near another line: number of the line, 0 or -1 for its end, and number of the nearest line."""
     if len(lines) < 2:
         return
-    stations_of = [resample(line.xyz[:, :2], STATION_M)[0] for line in lines]
+    stations_of = [line.line.resampled(STATION_M).xy for line in lines]
     number = np.repeat(np.arange(len(lines)), [len(one) for one in stations_of])
     stations = np.concatenate(stations_of)
     tree = cKDTree(stations)
@@ -111,8 +111,7 @@ def _near_ends(lines: Sequence[Centerline]) -> Iterator[tuple[int, int, int]]:
 
 def _extended(branch: np.ndarray, through: np.ndarray) -> np.ndarray | None:
     """Extend the start of a branch back to a through track, both (n, 3); None if they do not meet within reach."""
-    s = length_along(branch[:, :2])
-    feet = project([through[:, :2]], branch[:, :2], FIT_WITHIN_M)
+    s, feet = Polyline(branch).t, Polyline(through).feet(branch[:, :2], FIT_WITHIN_M)
     order = np.argsort(feet.point)
     count = int(np.argmin(np.append(feet.point[order] == np.arange(len(order)), False)))
     s, t, off = s[:count], feet.t[order][:count], feet.across[order][:count]
@@ -124,7 +123,7 @@ def _extended(branch: np.ndarray, through: np.ndarray) -> np.ndarray | None:
     if joins > len(s) // 2 or law.touch < -MAX_BACK_M:
         return None
     length = s[joins] - law.touch if s[joins] - law.touch > VERTEX_STEP_M else 0.0
-    along = length_along(through[:, :2])
+    along = Polyline(through).t
     parting = t[joins] - np.sign(t[-1] - t[0]) * length
     if not 0 <= parting <= along[-1]:
         return None
@@ -177,8 +176,8 @@ def _rms(misfit_m: np.ndarray) -> float:
 
 def _with_bridged(line: Centerline, xyz: np.ndarray) -> Centerline:
     """Give a branch its new vertices; the extension has no rails of its own."""
-    added = length_along(xyz[:, :2])[-1] - length_along(line.xyz[:, :2])[-1]
-    return replace(line, xyz=xyz, bridged_m=line.bridged_m + max(float(added), 0.0))
+    added = Polyline(xyz).length_m - line.line.length_m
+    return replace(line, xyz=xyz, bridged_m=line.bridged_m + max(added, 0.0))
 
 
 def _with_vertex(xyz: np.ndarray, vertex: np.ndarray) -> np.ndarray:
@@ -189,5 +188,5 @@ def _with_vertex(xyz: np.ndarray, vertex: np.ndarray) -> np.ndarray:
         moved = xyz.copy()
         moved[nearest] = vertex
         return moved
-    t = project([xyz[:, :2]], vertex[None, :2], reach_m=TOUCH_M).t
-    return np.insert(xyz, np.searchsorted(length_along(xyz[:, :2]), t), vertex, axis=0)
+    line = Polyline(xyz)
+    return np.insert(xyz, np.searchsorted(line.t, line.feet(vertex[None, :2], TOUCH_M).t), vertex, axis=0)

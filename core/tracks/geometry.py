@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from ..lines.smoothing import smooth_line, smooth_profile
-from ..polyline import distance_to, interpolate, left_normals, length_along, resample
+from ..polyline import Polyline, distance_to
 from ..progress import SILENT, Progress
 from ..rails import Centerline, RailLine, TrackGeometry, cell_borders
 from ..standards import Gauge
@@ -106,17 +106,17 @@ class _TrackRails:
         return self._side(numbers) if numbers else self.all_rails
 
     def _side(self, numbers: Sequence[int]) -> Side:
-        spans = [(number, (0.0, float(length_along(self.rails[number].xyz[:, :2])[-1]))) for number in numbers]
+        spans = [(number, (0.0, self.rails[number].line.length_m)) for number in numbers]
         return Side.of(self.rails, spans, 0.0)
 
 
 def _measure(line: Centerline, track_rails: _TrackRails, head_width_m: float, step_m: float) -> TrackGeometry:
     """Measure one track."""
     rails = track_rails.rails
-    fine, along = resample(line.xyz, MEETING_STEP_M)
+    stations = line.line.resampled(MEETING_STEP_M)
+    fine, along, normals = stations.xyz, stations.t, stations.normals
     # The last station is the end of the track, so that the part after the last multiple of the step is covered.
     chainage = np.append(np.arange(max(round(along[-1] / step_m), 1)) * step_m, along[-1])
-    normals = left_normals(fine)
     half = 0.5 * (line.gauge_mm / 1000 + head_width_m if np.isfinite(line.gauge_mm) else track_rails.spacing_m)
     left = track_rails.named(line.left_ids).meet(fine[:, :2], normals, half)
     right = track_rails.named(line.right_ids).meet(fine[:, :2], -normals, half)
@@ -132,7 +132,7 @@ def _measure(line: Centerline, track_rails: _TrackRails, head_width_m: float, st
     cells = np.stack([borders[:-1], borders[1:]])
     return TrackGeometry(
         track_id=line.track_id,
-        xyz=interpolate(line.xyz, length_along(line.xyz[:, :2]), chainage),
+        xyz=line.line.at(chainage),
         chainage_m=chainage,
         gauge_mm=1000 * _profile(along, gauge, chainage),
         cant_mm=1000 * _profile(along, cant, chainage),
@@ -159,7 +159,7 @@ def _profile(along: np.ndarray, values: np.ndarray, chainage: np.ndarray) -> np.
 
 def _radius(xy: np.ndarray, chainage: np.ndarray) -> np.ndarray:
     """Return the radius of the circle through three points; near an end, of the last such circle on the line."""
-    length = length_along(xy)[-1]
+    length = Polyline(xy).length_m
     half = min(HALF_CHORD_M, 0.5 * length)
     middle = np.clip(chainage, half, length - half)
     at = np.concatenate([middle - half, middle, middle + half])
@@ -250,5 +250,5 @@ def _points_before(rail: RailLine, t: np.ndarray) -> np.ndarray:
     """Count the points between the start of a rail and chainages, (n,); without support, as if evenly spaced."""
     support = rail.support
     if support is None:
-        return rail.points * np.clip(t / length_along(rail.xyz[:, :2])[-1], 0.0, 1.0)
+        return rail.points * np.clip(t / rail.line.length_m, 0.0, 1.0)
     return np.interp(t, support.t, np.cumsum(support.points) - 0.5 * support.points)

@@ -10,9 +10,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
 
-from ..polyline import interpolate, length_along
+from ..polyline import Chords
 from ..rails import RailLine
 from .chaining import Chain, RailAhead, rails_ahead, runs_on
 from .pairing import RailPair
@@ -127,29 +126,21 @@ class Meeting:
 
 @dataclass(frozen=True)
 class Side:
-    """The rails on one side of a track, in short segments: segment k runs from point k to point k + 1 of a section.
+    """The rails on one side of a track, in sections.
 
     Attributes
     ----------
-    xyz : (n, 3) array
-    section : (n,) int array
-        Number of the section to which each point belongs.
-    rail : (n,) int array
-        Number of the rail.
-    t : (n,) array
-        Plan chainage along the rail.
+    chords : Chords
+        The sections, each from its margin before to its margin behind.
+    rail : (k,) int array
+        Number of the rail of each section.
     paired : (n,) bool array
-        Whether the point is in the section itself, not in the margin.
-    tree : cKDTree
-        Index of the points in plan.
+        Whether a place of the chords is in the section itself, not in the margin.
     """
 
-    xyz: np.ndarray
-    section: np.ndarray
+    chords: Chords
     rail: np.ndarray
-    t: np.ndarray
     paired: np.ndarray
-    tree: cKDTree
 
     @classmethod
     def of(cls, rails: Sequence[RailLine], spans: Sequence[tuple[int, tuple[float, float]]], margin_m: float) -> Side:
@@ -163,57 +154,21 @@ class Side:
         margin_m : float
             Length added at both ends, for a rail that continues while the other one has a gap.
         """
-        pieces, chainages, paired = [], [], []
-        for number, span in spans:
-            line = rails[number].xyz
-            along = length_along(line[:, :2])
-            start, end = max(min(span) - margin_m, 0.0), min(max(span) + margin_m, along[-1])
-            chainages.append(np.linspace(start, end, int(np.ceil((end - start) / SEARCH_STEP_M)) + 1))
-            pieces.append(interpolate(line, along, chainages[-1]))
-            paired.append((chainages[-1] >= min(span)) & (chainages[-1] <= max(span)))
-        counts = [len(piece) for piece in pieces]
-        rail = np.repeat([number for number, _ in spans], counts)
-        section = np.repeat(np.arange(len(pieces)), counts)
-        xyz, t = np.concatenate(pieces), np.concatenate(chainages)
-        return cls(xyz, section, rail, t, np.concatenate(paired), cKDTree(xyz[:, :2]))
+        ends = [(min(span), max(span)) for _, span in spans]
+        parts = [
+            rails[number].line.resampled(SEARCH_STEP_M, start - margin_m, end + margin_m)
+            for (number, _), (start, end) in zip(spans, ends)
+        ]
+        paired = [(part.t >= start) & (part.t <= end) for part, (start, end) in zip(parts, ends)]
+        return cls(Chords.joined(parts), np.array([number for number, _ in spans]), np.concatenate(paired))
 
     def meet(
         self, stations: np.ndarray, directions: np.ndarray, expected_m: float, max_offset_m: float = MAX_OFFSET_M
     ) -> Meeting:
-        """Find the rails in given directions from stations.
-
-        Parameters
-        ----------
-        stations : (n, 2) array
-        directions : (n, 2) array
-            Unit vectors.
-        expected_m : float
-            Expected distance of the rail.
-        max_offset_m : float
-            Maximum deviation from the expected place.
-        """
-        off, nearest = self.tree.query(stations + expected_m * directions, distance_upper_bound=max_offset_m)
-        nearest = np.where(np.isfinite(off), nearest, 0)
-        found = np.full((3, len(stations)), np.nan)
-        for first in (nearest - 1, nearest):
-            a, b = np.maximum(first, 0), np.minimum(first + 1, len(self.xyz) - 1)
-            ahead_a, ahead_b = (self._ahead(point, stations, directions) for point in (a, b))
-            passed = ahead_a - ahead_b
-            share = np.divide(ahead_a, passed, out=np.full(len(passed), np.inf), where=passed != 0)
-            # A rail is extended by a segment, because two rails of a track do not end abreast to the centimetre.
-            met = np.isfinite(off) & (self.section[a] == self.section[b]) & (share >= -1) & (share <= 2)
-            share = np.where(met, share, 0.0)
-            point = self.xyz[a] + share[:, None] * (self.xyz[b] - self.xyz[a])
-            distance = np.einsum("ij,ij->i", point[:, :2] - stations, directions)
-            t = self.t[a] + share * (self.t[b] - self.t[a])
-            found = np.where(met, [distance, point[:, 2], t], found)
-        distance, height, t = found
-        return Meeting(distance, height, self.rail[nearest], t, self.paired[nearest])
-
-    def _ahead(self, point: np.ndarray, stations: np.ndarray, directions: np.ndarray) -> np.ndarray:
-        """Return the offset of points to the left of the rays from the stations in their directions, (n,)."""
-        step = self.xyz[point, :2] - stations
-        return directions[:, 0] * step[:, 1] - directions[:, 1] * step[:, 0]
+        """Find the rails in given directions, (n, 2) unit vectors, from stations, (n, 2); see `Chords.meet`."""
+        place, xyz, t = self.chords.meet(stations, directions, expected_m, max_offset_m)
+        distance = np.einsum("ij,ij->i", xyz[:, :2] - stations, directions)
+        return Meeting(distance, xyz[:, 2], self.rail[self.chords.line[place]], t, self.paired[place])
 
 
 def at_gauge(left: Meeting, right: Meeting, spacing_m: float, tolerance_m: float) -> tuple[Meeting, Meeting]:

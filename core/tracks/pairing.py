@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..parameters import Parameters
-from ..polyline import interpolate, left_normals, length_along, project
+from ..polyline import Polyline
 from ..progress import SILENT, Progress
 from ..rails import RailLine
 from .dtw import match_polylines
@@ -176,15 +176,15 @@ def _match(rails: Sequence[RailLine], section: Parallels, spacing: float, tolera
     a, b, same = int(section.a[0]), int(section.b[0]), bool(section.same[0])
     side_a = LEFT if section.left_m[0] > 0 else RIGHT
     side_b = -side_a if same else side_a
-    curve_a = _OffsetCurve.along(rails[a].xyz[:, :2], section.t_a, side_a * spacing / 2)
-    curve_b = _OffsetCurve.along(rails[b].xyz[:, :2], section.t_b, side_b * spacing / 2)
-    if not same:
-        curve_b = curve_b.reversed()
-    for s_a, s_b in _abreast(curve_a, curve_b, tolerance_m):
-        for found in match_polylines(curve_a.at(s_a), curve_b.at(s_b), tolerance_m):
-            t_a, t_b = curve_a.t_at(s_a[found.first]), curve_b.t_at(s_b[found.second])
-            match = _Match(a, b, t_a, t_b, side_a, side_b, found.penalty / found.length)
-            if match.length_m >= MIN_SECTION_M and _on_one_level(rails[a].xyz, t_a, rails[b].xyz, t_b):
+    sense = 1 if same else -1
+    curve_a = _offset_curve(rails[a].line, section.t_a, side_a * spacing / 2)
+    curve_b = _offset_curve(rails[b].line, section.t_b, side_b * spacing / 2)
+    curve_b = Polyline(curve_b.xyz[::sense], sense * curve_b.t[::sense])
+    for t_a, t_b in _abreast(curve_a, curve_b, tolerance_m):
+        for found in match_polylines(curve_a.at(t_a), curve_b.at(t_b), tolerance_m):
+            own = t_a[found.first], sense * t_b[found.second]
+            match = _Match(a, b, *own, side_a, side_b, found.penalty / found.length)
+            if match.length_m >= MIN_SECTION_M and _on_one_level(rails[a], rails[b], *own):
                 yield match
 
 
@@ -196,63 +196,38 @@ def _is_nearest(match: _Match, section: Parallels, spacing: float, others_m: Seq
     return all(abs(apart_m - spacing) <= abs(apart_m - other) for other in others_m)
 
 
-def _on_one_level(a: np.ndarray, t_a: np.ndarray, b: np.ndarray, t_b: np.ndarray) -> bool:
-    """Return whether two rails, (n, 3) and (m, 3), are on one level at chainages; unknown heights count as equal."""
-    z_a, z_b = (np.interp(t, length_along(line[:, :2]), line[:, 2]) for line, t in ((a, t_a), (b, t_b)))
+def _on_one_level(a: RailLine, b: RailLine, t_a: np.ndarray, t_b: np.ndarray) -> bool:
+    """Return whether two rails are on one level at chainages; unknown heights count as equal."""
+    z_a, z_b = a.line.at(t_a)[:, 2], b.line.at(t_b)[:, 2]
     apart = np.abs(z_a - z_b)[np.isfinite(z_a - z_b)]
     return not len(apart) or bool(np.median(apart) <= MAX_LEVEL_M)
 
 
-@dataclass(frozen=True)
-class _OffsetCurve:
-    """Part of a rail moved to its left: vertices, (m, 2), chainage along the curve and along the rail, (m,) each."""
-
-    xy: np.ndarray
-    s: np.ndarray
-    t: np.ndarray
-
-    @classmethod
-    def along(cls, rail: np.ndarray, t: np.ndarray, left_m: float) -> _OffsetCurve:
-        """Move the part of a rail, (n, 2), around the chainages `t` to the left by `left_m`."""
-        along = length_along(rail)
-        start, end = max(t.min() - MARGIN_M, 0.0), min(t.max() + MARGIN_M, along[-1])
-        stations = np.linspace(start, end, int(np.ceil((end - start) / COARSE_STEP_M)) + 1)
-        curve = interpolate(rail, along, stations)
-        curve = curve + left_m * left_normals(curve)
-        return cls(curve, length_along(curve), stations)
-
-    def reversed(self) -> _OffsetCurve:
-        """Return the same curve in the opposite direction."""
-        return _OffsetCurve(self.xy[::-1], self.s[-1] - self.s[::-1], self.t[::-1])
-
-    def at(self, s: np.ndarray) -> np.ndarray:
-        """Return the places at chainages along the curve, (n, 2)."""
-        return interpolate(self.xy, self.s, s)
-
-    def t_at(self, s: np.ndarray) -> np.ndarray:
-        """Convert chainages along the curve to chainages along the rail, (n,)."""
-        return np.interp(s, self.s, self.t)
+def _offset_curve(rail: Polyline, t: np.ndarray, left_m: float) -> Polyline:
+    """Move the part of a rail around the chainages `t` to the left by `left_m`; it keeps the chainages of the rail."""
+    part = rail.resampled(COARSE_STEP_M, t.min() - MARGIN_M, t.max() + MARGIN_M)
+    return Polyline(part.xy + left_m * part.normals, part.t)
 
 
-def _abreast(a: _OffsetCurve, b: _OffsetCurve, tolerance_m: float) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+def _abreast(a: Polyline, b: Polyline, tolerance_m: float) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Place stations abreast of each other where two curves are within the tolerance; yields chainages along both.
 
     With vertices abreast of each other no segment, however long, is without a neighbour, so their spacing depends only
     on the shape of the curves. It is finer only where a section may end.
     """
-    near = np.zeros(len(a.s), dtype=bool)
-    near[project([b.xy], a.xy, tolerance_m).point] = True
+    near = np.zeros(len(a.t), dtype=bool)
+    near[b.feet(a.xy, tolerance_m).point] = True
     changes = np.flatnonzero(np.diff(near))
     share = np.arange(FINE_STEP_M / COARSE_STEP_M, 1.0, FINE_STEP_M / COARSE_STEP_M)
-    s = np.sort(np.append(a.s, a.s[changes, None] + share * np.diff(a.s)[changes, None]))
-    feet = project([b.xy], a.at(s), tolerance_m)
+    stations = np.sort(np.append(a.t, a.t[changes, None] + share * np.diff(a.t)[changes, None]))
+    feet = b.feet(a.at(stations), tolerance_m)
     order = np.argsort(feet.point)
     point, t = feet.point[order], feet.t[order]
     # The start of a closed rail may be in the middle of the section.
     apart = (np.diff(point) > 1) | (np.abs(np.diff(t)) > MIN_BREAK_M)
     for run in np.split(np.arange(len(point)), np.flatnonzero(apart) + 1):
         if len(run) > 1:
-            yield s[point[run]], t[run]
+            yield stations[point[run]], t[run]
 
 
 def _select(matches: Sequence[_Match]) -> list[_Match]:
@@ -285,18 +260,17 @@ def _without_ghosts(matches: Sequence[_Match]) -> list[_Match]:
 
 def _misfit_m(rails: Sequence[RailLine], match: _Match, spacing: float) -> tuple[float, float]:
     """Return how unlike two rails of a track the rails of a match are: off the gauge, and wandering (weighted)."""
-    a, b = rails[match.a].xyz, rails[match.b].xyz
+    a, b = rails[match.a].line, rails[match.b].line
     start, end = np.sort(match.t_a[[0, -1]]).tolist()
     t = np.arange(start, end, COARSE_STEP_M)
-    places = interpolate(a, length_along(a[:, :2]), t)
-    along = length_along(b[:, :2])
+    places = a.at(t)
     # Of a long rail only the part of this match: many matches of one rail must not cost the square of its length.
-    first, after = np.searchsorted(along, [match.t_b.min() - MARGIN_M, match.t_b.max() + MARGIN_M])
-    first = max(first - 1, 0)
-    feet = project([b[first : after + 1, :2]], places[:, :2], 2 * spacing)
+    first, after = np.searchsorted(b.t, [match.t_b.min() - MARGIN_M, match.t_b.max() + MARGIN_M])
+    near = slice(max(first - 1, 0), after + 1)
+    feet = Polyline(b.xyz[near], b.t[near]).feet(places[:, :2], 2 * spacing)
     order = np.argsort(feet.point)
     apart = np.abs(feet.across[order])
-    heights = np.interp(feet.t[order] + along[first], along, b[:, 2])
+    heights = b.at(feet.t[order])[:, 2]
     level = np.nan_to_num(places[feet.point[order], 2] - heights)
     off = float(np.sqrt(np.mean((apart - spacing) ** 2)))
     return off, WANDER_WEIGHT * (_wander(apart) + _wander(level))

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..polyline import left_normals, resample, unit_tangents
 from ..progress import SILENT, Progress
 from ..rails import RailLine
 from ..standards import Gauge
@@ -128,9 +127,9 @@ def _is_crowded(stations: np.ndarray) -> np.ndarray:
 
 def _stations(rails: Sequence[RailLine]) -> tuple[np.ndarray, ...]:
     """Return rail number, place, chainage, direction and left normal of the stations along all rails."""
-    sampled = [resample(rail.xyz[:, :2], SAMPLE_STEP_M) for rail in rails]
-    number = np.repeat(np.arange(len(rails)), [len(t) for _, t in sampled])
-    columns = zip(*((xy, t, unit_tangents(xy), left_normals(xy)) for xy, t in sampled))
+    sampled = [rail.line.resampled(SAMPLE_STEP_M) for rail in rails]
+    number = np.repeat(np.arange(len(rails)), [len(one.t) for one in sampled])
+    columns = zip(*((one.xy, one.t, one.tangents, one.normals) for one in sampled))
     return (number, *(np.concatenate(column) for column in columns))
 
 

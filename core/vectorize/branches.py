@@ -24,7 +24,7 @@ from ..lines.ends import (
     tip_and_direction,
 )
 from ..lines.network import LineNetwork
-from ..polyline import length_along
+from ..polyline import Polyline
 from ..progress import SILENT, Progress
 from .crossings import MISFIT_M as KNOWN_MISFIT_M
 from .crossings import SKIP_M
@@ -140,7 +140,7 @@ def attach_branches(network: LineNetwork, seen: cKDTree, max_gap_m: float, progr
     high = np.array([line.max(axis=0) for line in network.lines]) + MAX_BESIDE_M
     for end in progress.follow(np.flatnonzero(network.degrees()[network.ends.ravel()] == 1).tolist()):
         from_end = network.from_end(end)
-        if length_along(from_end)[-1] < FIT_M:
+        if Polyline(from_end).length_m < FIT_M:
             continue
         near = np.flatnonzero(((from_end[0] > low) & (from_end[0] < high)).all(axis=1))
         touches = [
@@ -177,10 +177,10 @@ def _touch(from_end: np.ndarray, line: np.ndarray) -> tuple[int, Bridge] | None:
         return None
     onward = way[int(np.abs(x - touch_m).argmin())]
     stock = line[onward:] if way[0] < way[-1] else line[onward::-1]
-    curve = bridge(from_end, stock, misfit_m=KNOWN_MISFIT_M) if length_along(stock)[-1] >= DIRECTION_M else None
+    curve = bridge(from_end, stock, misfit_m=KNOWN_MISFIT_M) if Polyline(stock).length_m >= DIRECTION_M else None
     if curve is None:
         return None
-    further = int(np.searchsorted(length_along(stock), curve.cuts_m[1]))
+    further = int(np.searchsorted(Polyline(stock).t, curve.cuts_m[1]))
     vertex = int(onward + further if way[0] < way[-1] else onward - further)
     return (vertex, curve) if 0 < vertex < len(line) - 1 else None
 

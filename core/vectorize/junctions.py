@@ -12,7 +12,7 @@ import numpy as np
 from ..lines.ends import STEP_M, even_points, tip_and_direction
 from ..lines.finishing import parts_without_turns
 from ..lines.network import LineNetwork
-from ..polyline import length_along, part
+from ..polyline import Polyline
 from ..progress import SILENT, Progress
 
 SPUR_M = 1.0
@@ -155,7 +155,7 @@ def cut_kinks(network: LineNetwork, progress: Progress = SILENT) -> LineNetwork:
     nodes = list(network.nodes)
     for line, own in progress.follow(zip(network.lines, network.ends.tolist()), len(network.lines)):
         for start, end in parts_without_turns(line, STEP_M, KINK_STEP_M, KINK_DEG):
-            piece = line if end - start >= length_along(line)[-1] else part(line, start, end)
+            piece = line if end - start >= Polyline(line).length_m else Polyline(line).part(start, end).xyz
             lines.append(piece)
             ends.append([])
             for node, was, now in zip(own, line[[0, -1]], piece[[0, -1]]):

@@ -15,7 +15,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from ..lines.network import LineNetwork
-from ..polyline import length_along
+from ..polyline import Polyline
 from ..progress import SILENT, Progress
 from ..raster import RailRaster
 
@@ -343,7 +343,7 @@ def _corners(vertices: np.ndarray, borders: np.ndarray, cells: np.ndarray) -> tu
 
 def _extension(inward: np.ndarray, tip: np.ndarray) -> np.ndarray:
     """Return the step out of a line, given from its end inward, along its direction there until level with `tip`."""
-    along = length_along(inward)
-    back = [np.interp(min(TANGENT_PIXELS, along[-1]), along, axis) for axis in inward.T]
+    line = Polyline(inward)
+    back = line.at(np.array([min(TANGENT_PIXELS, line.length_m)]))[0]
     outward = (inward[0] - back) / np.hypot(*(inward[0] - back))
     return max(np.dot(tip - inward[0], outward), 0.0) * outward

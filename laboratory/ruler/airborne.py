@@ -18,7 +18,7 @@ from ...core.airborne.run import Run
 from ...core.airborne.survey import SWITCH, AirborneTrack, Guide, Survey
 from ...core.clouds.points import ask
 from ...core.parameters import AirborneParameters
-from ...core.polyline import length_along, resample
+from ...core.polyline import Polyline
 from ...core.tasks import InTurn
 from ..airborne.catalogue import FlownScene
 from ..airborne.designs import SPACING_M, Design
@@ -124,7 +124,7 @@ def compare_stations(
     )
     across, height = np.where(seen, across, np.nan), np.where(seen, height, np.nan)
     within = seen & (np.abs(across) < CERTAIN * sigma_m)
-    return Stationwise(seen, across, height, within, beside, flagged, length_along(truth[:, :2])[nearest])
+    return Stationwise(seen, across, height, within, beside, flagged, Polyline(truth).t[nearest])
 
 
 def surveyed(scene: FlownScene) -> Survey:
@@ -208,7 +208,7 @@ class Guided:
 def compare_guides(scene: FlownScene, found: Proposals) -> Guided:
     """Compare proposed guides with the true tracks of a scene."""
     design = scene.design
-    guides = [resample(found.frame.to_crs(one.xyz)[:, :2] - ORIGIN[:2], 1.0)[0] for one in found.guides]
+    guides = [Polyline(found.frame.to_crs(one.xyz)[:, :2] - ORIGIN[:2]).resampled(1.0).xyz for one in found.guides]
     tracks = [design.truth(number)[:, :2] for number in range(len(design.tracks))]
     visible = [track[~design.is_hidden(number, np.arange(len(track)) * STEP_M)] for number, track in enumerate(tracks)]
     return Guided(

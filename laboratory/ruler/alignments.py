@@ -16,7 +16,7 @@ from ...core.alignment.noise import Noise
 from ...core.alignment.plane_fit import Points, fit_plan
 from ...core.alignment.uncertainty import plan_errors
 from ...core.errors import ParameterError
-from ...core.polyline import length_along
+from ...core.polyline import Polyline
 from ...core.progress import SILENT, Recording
 from ..designs import TrackScene
 
@@ -98,7 +98,7 @@ def bound_of(design: Alignment, line: np.ndarray, white_m: float) -> Bound:
     white_m : float
         Standard deviation of independent errors across, metres.
     """
-    s = length_along(line[:, :2])
+    s = Polyline(line).t
     given = given_of(replace(design, plan=tuple(map(noted, design.plan))), 0.0, float(s[-1]))
     points = Points(line[:, :2], s, np.full(len(s), 1.0 / white_m**2))
     fit = fit_plan(given.chain, points, given.held, poses=given.poses)

@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 from skimage.morphology import skeletonize
 
 from ...core.clouds.points import RailPoints
-from ...core.polyline import length_along
+from ...core.polyline import Polyline
 from ...core.raster import cell_size, rasterize
 
 SMOOTHING_M = 0.8
@@ -56,7 +56,7 @@ def script_lines(points: RailPoints, gauge_m: float, head_width_m: float) -> lis
     lines = []
     for piece in _pieces(skeleton):
         xy = raster.to_local(piece + corner)
-        length_m = length_along(xy)[-1]
+        length_m = Polyline(xy).length_m
         if length_m >= SHORTEST_M:
             sigma = SMOOTHING_M / (length_m / (len(xy) - 1))
             lines.append(gaussian_filter1d(xy, sigma, axis=0, mode="mirror"))
@@ -113,5 +113,5 @@ def _heights(xy: np.ndarray, points: np.ndarray) -> np.ndarray | None:
     if len(known) == 0:
         return None
     z = np.interp(np.arange(len(z)), known, z[known])
-    spacing_m = length_along(xy)[-1] / (len(xy) - 1)
+    spacing_m = Polyline(xy).length_m / (len(xy) - 1)
     return gaussian_filter1d(z, SMOOTHING_M / spacing_m, mode="mirror")

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...core.comparison.pieces import ASTRAY_M, cut, spacing_and_cant
-from ...core.polyline import interpolate, left_normals, length_along, project
+from ...core.polyline import Polyline, project
 from ...core.rails import Centerline, RailLine, TrackGeometry
 
 CURVED_M = 1500.0
@@ -98,7 +98,7 @@ def compare_geometry(
     plain, curved = [np.empty((0, 2))], [np.empty(0)]
     for track in geometry:
         half_m = (np.nanmedian(track.gauge_mm) / 1000 + head_width_m) / 2
-        middle, to_left = track.xyz[:, :2], half_m * left_normals(track.xyz)
+        middle, to_left = track.xyz[:, :2], half_m * Polyline(track.xyz).normals
         true = spacing_and_cant(middle + to_left, middle - to_left, cut(rails))
         measured = np.column_stack([track.gauge_mm / 1000 + head_width_m, track.cant_mm / 1000])
         plain.append(measured - true)
@@ -115,11 +115,10 @@ def _true_radius(places: np.ndarray, centerlines: Sequence[np.ndarray]) -> np.nd
     feet = project([line[:, :2] for line in centerlines], places, ASTRAY_M)
     for number in np.unique(feet.line):
         mine = feet.of(int(number))
-        line = centerlines[number][:, :2]
-        along = length_along(line)
-        mine = mine[(mine.t >= CHORD_M) & (mine.t <= along[-1] - CHORD_M)]
+        line = Polyline(centerlines[number][:, :2])
+        mine = mine[(mine.t >= CHORD_M) & (mine.t <= line.length_m - CHORD_M)]
         t = mine.t[:, None] + CHORD_M * np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
-        around = interpolate(line, along, t.ravel()).reshape(-1, 5, 2)
+        around = line.at(t.ravel()).reshape(-1, 5, 2)
         bends = np.array([_curvature(around[:, [k, k + 1, k + 2]]) for k in range(3)])
         steady = (np.ptp(bends, axis=0) < STEADY * np.abs(bends[1])) & (np.abs(bends[1]) > 1 / CURVED_M)
         radius[mine.point[steady]] = 1 / np.abs(bends[1][steady])
@@ -139,8 +138,6 @@ def _rms(values: np.ndarray) -> float:
 
 def _places(line: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return places every `STEP_M` of a line and unit vectors to the left there, (n, 2) each."""
-    t = length_along(line[:, :2])
-    at = np.arange(STEP_M / 2, t[-1], STEP_M)
-    normals = left_normals(line[:, :2])
-    places, left = (np.column_stack([np.interp(at, t, c) for c in values[:, :2].T]) for values in (line, normals))
-    return places, left
+    own = Polyline(line[:, :2])
+    at = np.arange(STEP_M / 2, own.length_m, STEP_M)
+    return own.at(at), own.left_at(at)

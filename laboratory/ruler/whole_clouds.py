@@ -16,7 +16,7 @@ from ...core.grow.settings import GrowSettings
 from ...core.labelling.finding import search_square
 from ...core.progress import SILENT, Progress
 from ...core.rails import SearchFigures
-from ...core.squares.grid import Key, points_by_square, unique_keys
+from ...core.squares.grid import Key, Tiling
 from ...core.tasks import Context, Once
 
 
@@ -45,9 +45,9 @@ def classify_cloud(xyz: np.ndarray, settings: Settings, progress: Progress = SIL
     """
     rail = np.zeros(len(xyz), dtype=bool)
     figures = SearchFigures()
-    keys, square = unique_keys(xyz, settings.side_m)
+    keys, square = Tiling(settings.side_m).keys(xyz)
     context = Context({}, Once(), progress)
-    around_them = points_by_square(xyz, settings.side_m, MARGIN_M)
+    around_them = Tiling(settings.side_m, MARGIN_M).sort(xyz)
 
     def search(some: Sequence[Key], blunt: bool) -> Iterator[Part]:
         for key in progress.follow(some):
@@ -73,7 +73,7 @@ class GrowingCloud:
     """
 
     def __init__(self, xyz: np.ndarray, settings: GrowSettings) -> None:
-        self._squares = points_by_square(xyz, settings.classification.side_m, MARGIN_M)
+        self._squares = Tiling(settings.classification.side_m, MARGIN_M).sort(xyz)
         self._xyz = xyz
         self.heads = OnHeads(lambda key: xyz[self._numbers(key)], settings)
 

@@ -21,7 +21,7 @@ from ...core.comparison.pieces import cut
 from ...core.errors import RailExtractError
 from ...core.parameters import Parameters
 from ...core.pipeline import extract_files
-from ...core.polyline import Chords, resample
+from ...core.polyline import Chords, Polyline
 from ...core.rails import RailNetwork
 from ...core.report import Finding, list_findings
 from ...core.report.findings import examine
@@ -40,8 +40,8 @@ NEAR_M = 0.05
 BIN_M, END_M = 1.0, 3.0
 """Length of rail over which points are counted, and length at both ends of what the cloud shows that is left out."""
 
-MAX_GAP_M = Parameters.max_gap_m
-"""A rail that the cloud hides over more than this may be two lines."""
+BREAK_M = 2 * Parameters.max_gap_m
+"""Length of rail that the cloud hardly shows in which its line may end once: what is bridged, on either side."""
 
 FALSE_M = 3.0
 """Greatest length of lines that are on no rail."""
@@ -200,7 +200,18 @@ def to_be_found(world: World, pieces: Chords) -> np.ndarray:
         if seen.any():
             first, last = pieces.middle_t[mine][seen][[0, -1]]
             shown[mine] = seen & (pieces.middle_t[mine] > first + END_M) & (pieces.middle_t[mine] < last - END_M)
-    return shown
+    return shown & ~_is_flat(world, pieces)
+
+
+def _is_flat(world: World, pieces: Chords) -> np.ndarray:
+    """Return where a raw cloud from above shows no rail, (n,) bool: its beams and its blur are as wide as a groove.
+
+    Nothing else tells a head from the pavement around it.
+    """
+    paved_m = world.surroundings.paved_m
+    if paved_m is None or world.classified is not None or not world.survey.from_above:
+        return np.zeros(len(pieces.middle_t), dtype=bool)
+    return (pieces.middle_t > paved_m[0] - END_M) & (pieces.middle_t < paved_m[1] + END_M)
 
 
 def _blur_m(world: World) -> float:
@@ -210,7 +221,8 @@ def _blur_m(world: World) -> float:
 
 def _per_m(rail: np.ndarray, tree: cKDTree, half_m: float, bins: int) -> np.ndarray:
     """Count the points of a head in each section of `BIN_M` along its rail, (bins,), per metre."""
-    places, at = resample(rail, half_m / 2)
+    line = Polyline(rail).resampled(half_m / 2)
+    places, at = line.xyz, line.t
     near = tree.query_ball_point(places[:, :2], half_m)
     number = np.concatenate([np.asarray(one, dtype=np.int64) for one in near]) if len(near) else np.empty(0, np.int64)
     place = np.repeat(np.arange(len(places)), [len(one) for one in near])
@@ -232,7 +244,7 @@ def judge(world: World, network: RailNetwork) -> Judged:
     findings = list_findings(network, gauges_m) if network.centerlines else ()
     good = bool(network.centerlines) and verdict(examine(network, gauges_m))[0] == "good"
     at_findings = [
-        resample(np.atleast_2d(one.xyz), 1.0)[0] if len(np.atleast_2d(one.xyz)) > 1 else np.atleast_2d(one.xyz)
+        Polyline(one.xyz).resampled(1.0).xyz if len(np.atleast_2d(one.xyz)) > 1 else np.atleast_2d(one.xyz)
         for one in findings
     ]
     words = [frame.to_local(network.frame.to_crs(place)) for place in at_findings]
@@ -339,19 +351,15 @@ class _Ruler:
     def expected(self) -> tuple[int, int]:
         """Return the least and the largest number of lines that are right.
 
-        Each rail of which more than `END_M` is to be found is a line. It may be more where the cloud hides more of it
-        than is bridged; what shows less than is to be found may have lines, or not.
+        Each rail of which more than `END_M` is to be found is a line. What need not be found, apart from the ends, may
+        break a line once in each `BREAK_M`.
         """
         least = most = 0
         for number in range(self.found.truth_count):
             mine = self.pieces.number == number
-            t, seen = self.pieces.middle_t[mine], self.shown[mine]
-            least += bool(self.pieces.lengths[mine][seen].sum() > END_M)
-            borders = np.flatnonzero(np.diff(t[seen]) > MAX_GAP_M)
-            hidden = 0
-            if seen.any():
-                hidden = (t[seen][0] > 2 * END_M + MAX_GAP_M) + (t[-1] - t[seen][-1] > 2 * END_M + MAX_GAP_M)
-            most += 1 + len(borders) + hidden
+            seen_m, rail_m = (float(self.pieces.lengths[which].sum()) for which in (mine & self.shown, mine))
+            least += seen_m > END_M
+            most += 1 + int(max(rail_m - seen_m - 2 * END_M, 0.0) / BREAK_M + 0.5)
         return int(least), int(most)
 
     def _least_found(self) -> np.ndarray | None:

@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ...core.polyline import resample
+from ...core.polyline import Polyline
 from .raw import RawScene
 from .raw_catalogue import DRONE, double_track, far_track, from_air, level_crossing, station, turnout
 from .raw_scanner import MIXED, RawScanner
@@ -41,7 +41,7 @@ def classified(scene: RawScene, share: float = 1.0, train_share: float = 0.0, se
     """
     rng = np.random.RandomState(seed)
     chance = rng.random_sample(len(scene.kind))
-    places = np.concatenate([resample(rail, STEP_M)[0] for rail in scene.rails])
+    places = np.concatenate([Polyline(rail).resampled(STEP_M).xyz for rail in scene.rails])
     distance_m, place = cKDTree(places[:, :2]).query(scene.xyz[:, :2])
     above_m = scene.xyz[:, 2] - places[place, 2]
     mixed = (scene.kind == MIXED) & (above_m < ABOVE_M) & (share > 0)

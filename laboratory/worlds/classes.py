@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ...core.polyline import resample
+from ...core.polyline import Polyline
 from ..scenes.raw import RawScene
 from ..scenes.raw_scanner import MIXED
 from ..scenes.raw_world import FASTENING, FOOT, GROUND, GUARD, HEAD, PLANT, SLEEPER
@@ -132,7 +132,8 @@ def _along(
     """Places on the rails, (m, 3), their part of the length of the rail, and whether they are not classified, (m,)."""
     places, shares, gaps = [], [], []
     for rail in scene.rails:
-        place, at = resample(rail, STEP_M)
+        line = Polyline(rail).resampled(STEP_M)
+        place, at = line.xyz, line.t
         hidden = np.zeros(len(place), dtype=bool)
         for _ in range(rng.randint(how.gaps + 1)):
             start = rng.uniform(0.0, at[-1])

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 from qgis.core import (
@@ -20,11 +22,11 @@ from qgis.PyQt.QtGui import QIcon
 from qgis.PyQt.QtWidgets import QWidget
 
 from ...core.disk import Destination
-from ...core.fields import Field
+from ...core.jobs.declaration import RAILS, STEPS, Job
 from ...core.kernels import blas, one_thread
 from ...core.progress import Progress
 from ..dialog.checks import check_values, explain_invalid
-from ..dialog.definitions import Definitions
+from ..dialog.definitions import definitions_of
 from ..dialog.guide import guide
 from ..dialog.help_panel import help_panel
 from ..dialog.parameter_values import ParameterValues
@@ -36,65 +38,28 @@ from ..runs.missing import with_link
 from ..runs.running import running
 from ..setup.dependencies import explain_missing, missing_packages
 from ..writing.destinations import PAGE, appends, check_layer_name, check_page_name, destinations
-from ..writing.run import new_run
+from ..writing.layers import layer_writers
+from ..writing.reports import write_shown
+from ..writing.run import new_run, properties_of
 from ..writing.styling import NO_PROPERTIES
+from ..writing.whole_files import write_each
 from .sentences import COMMAND_LINE, sentence_for
-from .toolbox_groups import RAILS, STEPS, Group
-
-# Search terms, also in the languages of the larger railways: the toolbox search compares whole words.
-RAIL_WORDS = (
-    "rail",
-    "rails",
-    "railway",
-    "railroad",
-    "track",
-    "Gleis",
-    "Schiene",
-    "Bahn",
-    "voie ferrée",
-    "vía",
-    "binario",
-)
-CLOUD_WORDS = ("lidar", "las", "laz", "copc", "point cloud", "laser scanning", "Punktwolke", "nuage de points")
-TRACK_WORDS = ("gauge", "cant", "superelevation", "alignment", "Spurweite", "Gleisachse", "Überhöhung", "écartement")
-
-ALIGNMENT_WORDS = ("alignment", "elements", "straight", "clothoid", "arc", "Trasse", "Trassierung", "tracé")
 
 
 class RailAlgorithm(QgsProcessingAlgorithm):
     """An algorithm of Rail Extract in the toolbox.
 
-    A subclass states its name and its needs in the class attributes, its parameters in `definitions`, reads them in
-    `read` and computes in `compute`. Modules that depend on `NEEDS` are imported inside these two only.
+    A subclass has the declaration of its job, reads the parameters in `read` and computes in `compute`. Modules that
+    depend on what it needs are imported inside these two only.
     """
 
-    NAME = ""
-    LABEL = ""
-    GROUP: Group = RAILS
-    TAGS: tuple[str, ...] = ()
-    SUMMARY = ""
-    HELP = ""
-    FIELDS: tuple[Field, ...] = ()
-    """Fields of the main result, for the help on the command line; windows link to the reference."""
-    PICTURE = ""
-    """File in the folder of pictures, shown in the help panel of the dialog."""
-    GUIDE = "parameters"
-    """Page of the guide that the Help button opens."""
-    PAGES: tuple[str, ...] = ("parameters",)
-    """Pages of the guide to which the help panel links."""
-    NEEDS: tuple[tuple[str, ...], ...] = ()
-    """Required Python modules: of each inner tuple one is enough, and the first is recommended."""
-
+    JOB: Job
     layer_properties: Mapping[str, str] = NO_PROPERTIES
     """What the layers of a run remember of it; see `writing.run`."""
 
-    def definitions(self) -> Definitions:
-        """Return the parameters and outputs in the order of the interface."""
-        raise NotImplementedError
-
     def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:
         """Declare the parameters and outputs."""
-        for definition in self.definitions():
+        for definition in definitions_of(self.JOB):
             if isinstance(definition, QgsProcessingOutputDefinition):
                 self.addOutput(definition)
             elif _is_page(definition):
@@ -137,8 +102,9 @@ class RailAlgorithm(QgsProcessingAlgorithm):
     def _check(self, parameters: dict[str, Any], context: QgsProcessingContext) -> tuple[bool, str]:
         """Check as QGIS does, then that the outputs can be written, then as `read` does."""
         accepted, message = super().checkParameterValues(parameters, context)
-        if not accepted:
-            return False, self._refusal(parameters, context) or message
+        refusal = self._refusal(parameters, context)
+        if refusal or not accepted:
+            return False, refusal or message
         accepted, message = self.canExecute()
         if not accepted:
             return False, message
@@ -161,7 +127,7 @@ class RailAlgorithm(QgsProcessingAlgorithm):
         try:
             self.destinations = self._destinations(parameters, context)
             self._job = self._read(parameters, context)
-            self.layer_properties = new_run()
+            self.layer_properties = new_run(self.displayName(), parameters.get("INPUT"), context)
         except BaseException as error:
             raise QgsProcessingException(sentence_for(error, self.parameterDefinitions())) from None
         return True
@@ -182,7 +148,12 @@ class RailAlgorithm(QgsProcessingAlgorithm):
             progress.set_fraction(1)
             return results
         # PyQt keeps what is raised here: with the error as its context, files that it refers to would stay open.
+        notices.run_left.emit(sys._getframe())
         raise QgsProcessingException(reason)
+
+    def remember(self, properties: Mapping[str, str]) -> None:
+        """Have the layers of the run state further properties."""
+        self.layer_properties = {**self.layer_properties, **properties}
 
     def _destinations(self, parameters: dict[str, Any], context: QgsProcessingContext) -> dict[str, Destination]:
         """Check the files of the outputs, and remember what they replace."""
@@ -203,16 +174,15 @@ class RailAlgorithm(QgsProcessingAlgorithm):
     def _refusal(self, parameters: dict[str, Any], context: QgsProcessingContext) -> str | None:
         """Return what is wrong with the first input that QGIS does not accept."""
         reasons = (
-            explain_invalid(definition, parameters.get(definition.name()), context)
-            for definition in self.parameterDefinitions()
-            if not definition.isDestination()
+            explain_invalid(one, self.parameterDefinition(one.name), parameters.get(one.name), context)
+            for one in self.JOB.parameters
         )
         return next(filter(None, reasons), None)
 
     def canExecute(self) -> tuple[bool, str]:
         """Return whether the required packages are installed; the toolbox lists the algorithm in either case."""
         try:
-            missing = missing_packages(self.NEEDS)
+            missing = missing_packages(self.JOB.needs)
             if not missing:
                 return True, ""
             reason = explain_missing(self.displayName(), missing, self._usable_labels())
@@ -224,7 +194,9 @@ class RailAlgorithm(QgsProcessingAlgorithm):
         """Labels of the algorithms for classified clouds whose packages are all installed."""
         mates = self.provider().algorithms() if self.provider() else ()
         return [
-            mate.displayName() for mate in mates if mate.GROUP in (RAILS, STEPS) and not missing_packages(mate.NEEDS)
+            mate.displayName()
+            for mate in mates
+            if mate.JOB.group in (RAILS, STEPS) and not missing_packages(mate.JOB.needs)
         ]
 
     def createCustomParametersWidget(self, parent: QWidget | None = None) -> QWidget:
@@ -239,39 +211,39 @@ class RailAlgorithm(QgsProcessingAlgorithm):
 
     def name(self) -> str:
         """Return the identifier for scripts and models; it never changes."""
-        return self.NAME
+        return self.JOB.name
 
     def displayName(self) -> str:
         """Return the label shown in the toolbox."""
-        return self.LABEL
+        return self.JOB.label
 
     def group(self) -> str:
         """Return the label of the group."""
-        return self.GROUP.label
+        return self.JOB.group.label
 
     def groupId(self) -> str:
         """Return the identifier of the group."""
-        return self.GROUP.id
+        return self.JOB.group.id
 
     def tags(self) -> list[str]:
         """Return the search terms."""
-        return list(self.TAGS)
+        return list(self.JOB.tags)
 
     def shortDescription(self) -> str:
         """Return the sentence of the tooltip."""
-        return self.SUMMARY
+        return self.JOB.summary
 
     def shortHelpString(self) -> str:
         """Return the text of the help panel; a command line prints no HTML, and the summary and parameters itself."""
-        summary, text = self.SUMMARY, self.HELP
+        summary, text = self.JOB.summary, self.JOB.help
         if QgsApplication.platform() == COMMAND_LINE:
-            return "\n\n".join((text, *(f"{field.name}: {field.meaning}." for field in self.FIELDS)))
-        picture = PICTURES / self.PICTURE if self.PICTURE else None
-        return help_panel(summary, picture, text, self.parameterDefinitions(), self.PAGES)
+            return "\n\n".join((text, *(f"{field.name}: {field.meaning}." for field in self.JOB.fields)))
+        picture = PICTURES / self.JOB.picture if self.JOB.picture else None
+        return help_panel(summary, picture, text, self.parameterDefinitions(), self.JOB.pages)
 
     def helpUrl(self) -> str:
         """Return the address of the guide's page."""
-        return guide(self.GUIDE)
+        return guide(self.JOB.guide)
 
     def icon(self) -> QIcon:
         """Return the icon shown in the toolbox."""
@@ -279,7 +251,32 @@ class RailAlgorithm(QgsProcessingAlgorithm):
 
     def svgIconPath(self) -> str:
         """Return the path of the icon, where QGIS draws it itself."""
-        return str(ICONS / f"{self.NAME}.svg")
+        return str(ICONS / f"{self.JOB.name}.svg")
+
+
+class JobAlgorithm(RailAlgorithm):
+    """An algorithm that reads, runs and writes as its job declares."""
+
+    def read(self, values: ParameterValues) -> ParameterValues:
+        """Open the layers and check the values."""
+        values.open_sources()
+        self.JOB.check(values)
+        return values
+
+    def compute(self, job: ParameterValues, values: ParameterValues, progress: Progress) -> dict[str, Any]:
+        """Run, then write what is wanted of the result."""
+        values.follow(job)
+        result = self.JOB.run(values, progress)
+        progress.check()
+        if result.cloud is not None:
+            cloud = values.cloud(result.cloud.name)
+            shown = result.cloud.class_codes, result.cloud.head_width_m
+            self.remember(properties_of(cloud, *shown, result.frame))
+        for sentence in result.sentences:
+            progress.info(sentence)
+        writers = layer_writers(values, result.layers, result.frame)
+        writers.update({name: partial(write_shown, values, make, name) for name, make in result.pages.items()})
+        return {**write_each(writers, values), **result.figures}
 
 
 def _is_page(definition: QgsProcessingParameterDefinition) -> bool:

@@ -4,50 +4,46 @@ from __future__ import annotations
 
 import platform
 import sys
+from dataclasses import replace
 from typing import Any
 
-from qgis.core import (
-    Qgis,
-    QgsProcessingOutputBoolean,
-    QgsProcessingOutputString,
-)
+from qgis.core import Qgis
 
 from ...core.errors import RailExtractError
+from ...core.jobs import extract_rails
+from ...core.jobs.declaration import SETUP, Figure, Job
+from ...core.jobs.shared import REPORT
 from ...core.progress import Progress
-from ..dialog import outputs
-from ..dialog.definitions import Definitions
 from ..dialog.parameter_values import ParameterValues
 from ..setup.dependencies import missing_packages
 from ..writing.reports import write_check
 from .base import RailAlgorithm
-from .extract_rails import ExtractRails
-from .toolbox_groups import SETUP
+
+JOB = Job(
+    "checkinstallation",
+    "Check installation",
+    "Lists the versions, the engine and the models in use, and tests them on a short piece of track.",
+    "Takes less than a minute. It extracts 20 m of the sample that comes with the plugin and compares the lines "
+    "with the true rails. Include the output in every bug report.",
+    ("rail", "setup", "version", "versions", "test", "diagnose", "support", "gpu", "cuda", "engine"),
+    # Without the report among the outputs, QGIS would open no dialog and show no result.
+    outputs=(replace(REPORT, help="A web page with the result, to be attached to bug reports."),),
+    figures=(
+        Figure("VERSIONS", "Versions of QGIS, Python and packages", "text"),
+        Figure("MODELS", "State of the models", "text"),
+        Figure("ENGINE_USED", "Engine and device that run the network", "text"),
+        Figure("SELF_TEST", "Result of the test", "text"),
+        Figure("PASSED", "Whether all checks passed", "flag"),
+    ),
+    group=SETUP,
+    guide="troubleshooting",
+)
 
 
 class CheckInstallation(RailAlgorithm):
     """The algorithm ``railextract:checkinstallation``."""
 
-    NAME = "checkinstallation"
-    LABEL = "Check installation"
-    GROUP = SETUP
-    GUIDE = "troubleshooting"
-    TAGS = ("rail", "setup", "version", "versions", "test", "diagnose", "support", "gpu", "cuda", "engine")
-    SUMMARY = "Lists the versions, the engine and the models in use, and tests them on a short piece of track."
-    HELP = (
-        "Takes less than a minute. It extracts 20 m of the sample that comes with the plugin and compares the lines "
-        "with the true rails. Include the output in every bug report."
-    )
-
-    def definitions(self) -> Definitions:
-        """Return the outputs; without the report among them, QGIS would open no dialog and show no result."""
-        return (
-            outputs.check_report(),
-            QgsProcessingOutputString("VERSIONS", "Versions of QGIS, Python and packages"),
-            QgsProcessingOutputString("MODELS", "State of the models"),
-            QgsProcessingOutputString("ENGINE_USED", "Engine and device that run the network"),
-            QgsProcessingOutputString("SELF_TEST", "Result of the test"),
-            QgsProcessingOutputBoolean("PASSED", "Whether all checks passed"),
-        )
+    JOB = JOB
 
     def read(self, values: ParameterValues) -> None:
         """Read nothing: there are no parameters."""
@@ -86,7 +82,7 @@ class CheckInstallation(RailAlgorithm):
         """Run the test if all packages for it are installed."""
         from ..setup import self_test
 
-        missing = missing_packages(ExtractRails.NEEDS)
+        missing = missing_packages(extract_rails.JOB.needs)
         if missing:
             names = ", ".join(package.module for package in missing)
             return False, f"{names} missing: run Install packages", ""

@@ -8,20 +8,19 @@ from typing import TYPE_CHECKING, Any
 
 from ...core.errors import ParameterError
 from ...core.frpdf.models import choose as choose_model
+from ...core.jobs.clouds import CloudSource, checked_crs, request_points
+from ...core.jobs.extract_rails import JOB
+from ...core.jobs.shared import figures_of, figures_of_stations
 from ...core.parameters import LEARNED
 from ...core.progress import Estimating, Progress
 from ...core.standards import DEFAULT, SEARCHED_CLASSES, Gauge, RailStandard
-from ..dialog import inputs, outputs
-from ..dialog import parameters as groups
-from ..dialog.definitions import Definitions
 from ..dialog.parameter_values import ParameterValues
-from ..reading.clouds import CloudSource, checked_crs, points_folder, request_points
-from ..systems import system
-from ..writing.layers import figures_of, figures_of_stations, layer_writers, write_raster
+from ..reading.clouds import points_folder
+from ..writing.layers import layer_writers, write_raster
 from ..writing.reports import write_report
 from ..writing.run import properties_of
 from ..writing.whole_files import write_each
-from .base import CLOUD_WORDS, RAIL_WORDS, TRACK_WORDS, RailAlgorithm
+from .base import RailAlgorithm
 
 if TYPE_CHECKING:
     import numpy as np
@@ -53,53 +52,7 @@ class Job:
 class ExtractRails(RailAlgorithm):
     """The algorithm ``railextract:extractrails``."""
 
-    NAME = "extractrails"
-    LABEL = "Extract rails"
-    TAGS = (*RAIL_WORDS, *CLOUD_WORDS, *TRACK_WORDS, "centerline", "centreline", "axis", "vectorize", "line", "3d")
-    NEEDS = (("numpy",), ("scipy",), ("laspy",), ("lazrs",), ("pyproj",), ("cv2", "torch"))
-    SUMMARY = "Turns lidar points classified as rail into the 3D lines of the railheads and of the track centerlines."
-    PICTURE = "gauge.svg"
-    HELP = (
-        "Choose the cloud and press Run; everything else has a default. If nobody has classified the cloud, tick the "
-        "box that finds the rail points. The coordinate system must be a projected one.\n\n"
-        "A rail line follows the top of the railhead on the axis of the head. Gauge is the distance between the two "
-        "rail "
-        "lines minus the railhead width; it is not measured 14 mm below the top. Cant is left minus right, as seen "
-        "along "
-        "the line.\n\n"
-        "The report says where the lines are good and where not. Findings are the places to look at."
-    )
-    PAGES = ("parameters", "tutorial", "limits", "troubleshooting")
-
-    def definitions(self) -> Definitions:
-        """Return the parameters and outputs in the order of the interface."""
-        return (
-            *inputs.cloud(),
-            inputs.merge_classes(),
-            inputs.classify(),
-            *groups.method(),
-            inputs.seeds_in_raw(),
-            *groups.rail(detect=True),
-            *groups.area(),
-            groups.model(is_advanced=True),
-            *groups.cleanup(),
-            *groups.lines(),
-            *groups.pairing(),
-            groups.strips(),
-            groups.step(),
-            groups.workers(),
-            *inputs.axis(optional=True),
-            outputs.rails("RAILS", optional=True),
-            outputs.further(outputs.centerlines("CENTERLINES", optional=True)),
-            outputs.further(outputs.on_demand(outputs.quality("QUALITY"))),
-            outputs.further(outputs.findings()),
-            outputs.further(outputs.on_demand(outputs.cleaned())),
-            outputs.report(),
-            *outputs.rail_figures(),
-            *outputs.centerline_figures(),
-            *outputs.quality_figures(),
-            outputs.engine(),
-        )
+    JOB = JOB
 
     def read(self, values: ParameterValues) -> Job:
         """Read and check the parameters, in the main thread."""
@@ -122,9 +75,9 @@ class ExtractRails(RailAlgorithm):
             SEARCHED_CLASSES if classify or grow else values.class_codes(),
             standard,
             values.other_gauges(standard),
-            values.command(),
+            values.command,
             weights,
-            values.seeds(cloud) if grow else (),
+            tuple(values.seeds(checked_crs(cloud))) if grow else (),
             self._axes(cloud, values),
         )
 
@@ -134,7 +87,7 @@ class ExtractRails(RailAlgorithm):
             return None
         if not any(map(values.wanted, MEASURED)):
             raise ParameterError("AXIS gives QUALITY, FINDINGS and REPORT kilometres: name at least one of these.")
-        return values.axes(system(checked_crs(cloud)))
+        return values.axes(checked_crs(cloud))
 
     def _detected(self, job: Job, request: Request, values: ParameterValues, progress: Progress) -> Job:
         """Return the job with the rail standard that fits the points."""
@@ -170,7 +123,7 @@ class ExtractRails(RailAlgorithm):
         for failure in network.failures:
             progress.warning(failure)
         origin = Origin(job.cloud.paths, job.standard, job.other_gauges, job.command, settings)
-        self.layer_properties = properties_of(job.cloud, job.class_codes, job.standard.head_width_m, network.frame)
+        self.remember(properties_of(job.cloud, job.class_codes, job.standard.head_width_m, network.frame))
         for sentence in summary(network, origin.gauges_m):
             progress.info(sentence)
         written = self._write(job, network, origin, values)
@@ -197,6 +150,6 @@ class ExtractRails(RailAlgorithm):
         if not any(raster.tiles for raster in network.cleaned):
             return {}
         rasters, frame = on_one_grid(network.cleaned, network.frame)
-        extent, model = values.extent(system(network.frame.crs_wkt)), values.choice("MODEL")
+        extent, model = values.extent(network.frame.crs_wkt), values.choice("MODEL")
         header = header_for(rasters, network.cleaned_classes, frame, job.standard, extent, model)
         return write_raster(values, "CLEANED", header, rasters)

@@ -6,17 +6,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from qgis.core import QgsProcessingParameterRasterDestination
-
 from ...core.frpdf.models import Model
+from ...core.jobs.frpdf_cleanup import JOB
 from ...core.progress import Progress
-from ..dialog import inputs, outputs
-from ..dialog import parameters as groups
-from ..dialog.definitions import Definitions, helped
 from ..dialog.parameter_values import ParameterValues
 from ..writing.layers import write_raster
-from .base import RAIL_WORDS, RailAlgorithm
-from .toolbox_groups import STEPS
+from .base import RailAlgorithm
 
 if TYPE_CHECKING:
     from ...core.output.raster_file import RasterHeader
@@ -37,32 +32,7 @@ class Job:
 class FrpdfCleanup(RailAlgorithm):
     """The algorithm ``railextract:frpdfcleanup``."""
 
-    NAME = "frpdfcleanup"
-    LABEL = "Clean rail raster (FRPDF)"
-    GROUP = STEPS
-    TAGS = (*RAIL_WORDS, "raster", "neural network", "deep learning", "clean", "repair", "gaps", "noise")
-    PICTURE = "raster.svg"
-    NEEDS = (("numpy",), ("pyproj",), ("cv2", "torch"))
-    SUMMARY = "Closes gaps in a rail raster and removes cells that are not rail, with the neural network FRPDF."
-    HELP = (
-        "Takes the raster of Rasterize Rail Points, or a similar one. The result has the same grid, bands and tags. "
-        "The network works in passes: each pass starts from the result of the pass before.\n\n"
-        "A raster from other software does not state its gauge and railhead width: fill them in."
-    )
-
-    def definitions(self) -> Definitions:
-        """Return the parameters and outputs in the order of the interface."""
-        return (
-            inputs.raster(),
-            groups.model(),
-            *groups.cleanup(),
-            *groups.raster_rail(),
-            helped(
-                QgsProcessingParameterRasterDestination("OUTPUT", "Cleaned rail raster"),
-                "A GeoTIFF; the input of Vectorize Rails.",
-            ),
-            outputs.engine(),
-        )
+    JOB = JOB
 
     def read(self, values: ParameterValues) -> Job:
         """Read the header of the raster and check that a model fits it."""

@@ -6,24 +6,51 @@ import sys
 from dataclasses import dataclass
 from typing import Any
 
-from qgis.core import QgsProcessingOutputFolder, QgsProcessingOutputString
-
 from ...core.errors import Cancelled, ParameterError, RailExtractError
+from ...core.jobs import declaration
+from ...core.jobs.declaration import SETUP, Choice, Figure
 from ...core.progress import Progress
-from ..dialog import parameters as groups
-from ..dialog.definitions import Definitions
 from ..dialog.parameter_values import ParameterValues
 from ..notices import notices
 from ..setup import package_folders
 from ..setup.dependencies import INSTALL, OPTIONAL, PACKAGES, is_installed
 from .base import RailAlgorithm
-from .toolbox_groups import SETUP
 
 BUILDS = {
     ("CPU", "linux"): ("--index-url", "https://download.pytorch.org/whl/cpu"),
     ("CUDA", "win32"): ("--index-url", "https://download.pytorch.org/whl/cu126"),
 }
 """Options for pip where the default index has no such build of PyTorch for a system."""
+
+
+JOB = declaration.Job(
+    INSTALL,
+    "Install packages",
+    "Installs the Python packages that Rail Extract needs and this QGIS lacks.",
+    "The packages go into a folder of your QGIS profile, in versions that work with the numpy and scipy of QGIS. "
+    "QGIS itself is not changed, administrator rights are not needed, and packages that are already installed are "
+    "skipped. An internet connection is required.\n\n"
+    "PyTorch is optional: with it, the network can use a GPU, and the network of the paper runs faster than with "
+    "OpenCV; the smaller network, which is the default, takes the same time with both. The download is about "
+    "200 MB for the processor and several GB for an Nvidia GPU.",
+    ("rail", "setup", "install", "python", "pip", "dependencies", "laspy", "opencv", "torch", "pytorch"),
+    parameters=(
+        Choice(
+            "TORCH",
+            "PyTorch",
+            "NONE does not install PyTorch; OpenCV runs the network. CPU works on any computer. CUDA needs an Nvidia "
+            "GPU.",
+            options=("NONE", "CPU", "CUDA"),
+            default="NONE",
+        ),
+    ),
+    figures=(
+        Figure("FOLDER", "Folder of the packages", "folder"),
+        Figure("INSTALLED", "Installed packages", "text"),
+    ),
+    group=SETUP,
+    guide="troubleshooting",
+)
 
 
 @dataclass(frozen=True)
@@ -37,27 +64,7 @@ class Job:
 class InstallPackages(RailAlgorithm):
     """The algorithm ``railextract:installpackages``."""
 
-    NAME = INSTALL
-    LABEL = "Install packages"
-    GROUP = SETUP
-    GUIDE = "troubleshooting"
-    TAGS = ("rail", "setup", "install", "python", "pip", "dependencies", "laspy", "opencv", "torch", "pytorch")
-    SUMMARY = "Installs the Python packages that Rail Extract needs and this QGIS lacks."
-    HELP = (
-        "The packages go into a folder of your QGIS profile, in versions that work with the numpy and scipy of QGIS. "
-        "QGIS itself is not changed, administrator rights are not needed, and packages that are already installed are "
-        "skipped. An internet connection is required.\n\n"
-        "PyTorch is optional: the network runs faster with it than with OpenCV, and can use a GPU. The download is "
-        "about 200 MB for the processor and several GB for an Nvidia GPU."
-    )
-
-    def definitions(self) -> Definitions:
-        """Return the build of PyTorch to install, and what is said about the packages."""
-        return (
-            groups.torch(),
-            QgsProcessingOutputFolder("FOLDER", "Folder of the packages"),
-            QgsProcessingOutputString("INSTALLED", "Installed packages"),
-        )
+    JOB = JOB
 
     def read(self, values: ParameterValues) -> Job:
         """Find what is missing."""

@@ -13,15 +13,12 @@ from qgis.core import (
 )
 
 from ...core.errors import RailExtractError
-from ...core.fields import EXTENT_FIELDS, STATION_FIELDS
+from ...core.jobs.station_along_axis import JOB
 from ...core.progress import Progress
-from ..dialog import inputs, outputs
-from ..dialog.definitions import Definitions
 from ..dialog.parameter_values import ParameterValues
 from ..systems import prepare_system
 from ..writing.layers import copies, fields, write_copy
-from .base import RAIL_WORDS, RailAlgorithm
-from .toolbox_groups import ALIGNMENT
+from .base import RailAlgorithm
 
 if TYPE_CHECKING:
     from ...core.alignment.placed_axes import PlacedAxes
@@ -42,34 +39,7 @@ class Job:
 class StationAlongAxis(RailAlgorithm):
     """The algorithm ``railextract:stationalongaxis``."""
 
-    NAME = "stationalongaxis"
-    LABEL = "Station along axis"
-    GROUP = ALIGNMENT
-    TAGS = (*RAIL_WORDS, "kilometre", "chainage", "stationing", "linear referencing", "mileage", "Kilometrierung")
-    NEEDS = (("numpy",), ("scipy",), ("pyproj",))
-    SUMMARY = "Gives the features of any layer their kilometre along the axis of the railway, with offset and side."
-    PICTURE = "stationing.svg"
-    GUIDE = "stationing"
-    FIELDS = (*STATION_FIELDS, *EXTENT_FIELDS)
-    PAGES = ("stationing", "reference")
-    HELP = "\n\n".join(
-        (
-            "The axis is the line that carries the kilometres, often that of one track or the middle between two. Its "
-            "kilometres come from posts, from the kilometre at its start, or from its M values, in this order.",
-            "The copy has the fields km, km_text, offset_m (positive to the left), side and further ones; lines and "
-            "polygons also get km_from and km_to. The kilometre comes from the axis at right angles, never "
-            "from the length of a parallel track. Where numbers are missing or twice, piece tells the sections apart.",
-        )
-    )
-
-    def definitions(self) -> Definitions:
-        """Return the parameters and outputs in the order of the interface."""
-        return (
-            inputs.places(),
-            *inputs.axis(optional=False),
-            outputs.stationed(),
-            *outputs.station_figures(),
-        )
+    JOB = JOB
 
     def read(self, values: ParameterValues) -> Job:
         """Read and check the parameters, in the main thread."""
@@ -81,15 +51,15 @@ class StationAlongAxis(RailAlgorithm):
             raise RailExtractError("INPUT is a table without places: give a layer of points, lines or polygons.")
         prepare_system(wkt_of(source.sourceCrs()) or None)
         plane = plane_of(values.axis_crs(), source.sourceCrs())
-        return Job(source, plane, values.axes(plane))
+        return Job(source, plane, values.axes(wkt_of(plane) or None))
 
     def compute(self, job: Job, values: ParameterValues, progress: Progress) -> dict[str, Any]:
         """Locate the features, then write them with their kilometres."""
-        from ..reading.places import locate_features, station_fields
+        from ..reading.places import kept_fields, locate_features, station_fields
 
         located = locate_features(job.source, job.axes, job.plane, values.context, progress.span(0, LOCATING))
         added = fields(station_fields(job.source))
-        columns = QgsProcessingUtils.combineFields(job.source.fields(), added)
+        columns = QgsProcessingUtils.combineFields(kept_fields(job.source, progress), added)
         made = copies(located.features, columns, located.rows())
         shape, crs = job.source.wkbType(), job.source.sourceCrs()
         written = write_copy(values, "OUTPUT", columns, shape, made, crs)

@@ -6,16 +6,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ...core.jobs.clouds import CloudSource
+from ...core.jobs.shared import figures_of
+from ...core.jobs.vectorize_rails import JOB
 from ...core.progress import Progress
 from ...core.standards import RailStandard
-from ..dialog import inputs, outputs
-from ..dialog import parameters as groups
-from ..dialog.definitions import Definitions
 from ..dialog.parameter_values import ParameterValues
-from ..reading.clouds import CloudSource
-from ..writing.layers import figures_of, write_layer
-from .base import CLOUD_WORDS, RAIL_WORDS, RailAlgorithm
-from .toolbox_groups import STEPS
+from ..writing.layers import write_layer
+from .base import RailAlgorithm
 
 if TYPE_CHECKING:
     from ...core.output.raster_file import RasterHeader
@@ -38,33 +36,7 @@ class Job:
 class VectorizeRails(RailAlgorithm):
     """The algorithm ``railextract:vectorizerails``."""
 
-    NAME = "vectorizerails"
-    LABEL = "Vectorize rails"
-    GROUP = STEPS
-    TAGS = (*RAIL_WORDS, *CLOUD_WORDS, "raster", "vectorize", "line", "3d")
-    PICTURE = "gauge.svg"
-    NEEDS = (("numpy",), ("scipy",), ("laspy",), ("lazrs",), ("pyproj",))
-    SUMMARY = (
-        "Turns a rail raster into lines of the railheads; a point cloud gives them their exact position and height."
-    )
-    HELP = (
-        "Takes the raster of Clean Rail Raster, or a similar one. With the cloud from which the raster was made, a "
-        "line follows the top of the railhead on the axis of the head. Without the cloud, lines have no heights and "
-        "are only as accurate as the raster.\n\n"
-        "A raster from other software does not state its gauge and railhead width: fill them in."
-    )
-
-    def definitions(self) -> Definitions:
-        """Return the parameters and outputs in the order of the interface."""
-        return (
-            inputs.raster(),
-            inputs.points(),
-            *groups.lines(),
-            *groups.raster_rail(),
-            groups.leave_out(),
-            outputs.rails(),
-            *outputs.rail_figures(),
-        )
+    JOB = JOB
 
     def read(self, values: ParameterValues) -> Job:
         """Read the header of the raster, and find the files of the cloud."""
@@ -76,9 +48,9 @@ class VectorizeRails(RailAlgorithm):
         """Vectorize each class, then write the lines."""
         from ...core.checks.lines import warn_of_rails
         from ...core.fields import RAILS
+        from ...core.jobs.area_points import Area, read_points_in
         from ...core.output.layers import lines_layer
         from ...core.squares.steps import lines_of
-        from ..reading.area_points import Area, read_points_in
         from ..reading.geotiff import read_rasters
         from ..reading.rasters import moved
 

@@ -2,28 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
 from qgis.core import (
-    QgsCoordinateReferenceSystem,
     QgsProcessingContext,
     QgsProcessingParameterDefinition,
-    QgsProcessingParameterEnum,
-    QgsProcessingParameterExtent,
-    QgsProcessingParameterFeatureSource,
     QgsProcessingParameterNumber,
-    QgsProcessingParameterRasterLayer,
 )
 
-from .definitions import UNBOUNDED
+from ...core.design_numbers import number_in
+from ...core.jobs.declaration import Parameter
 from .parameter_values import ParameterValues
-
-EXPECTED = {
-    QgsProcessingParameterExtent: "four numbers: xmin,xmax,ymin,ymax",
-    QgsProcessingParameterFeatureSource: "a vector layer, or a vector file that can be read",
-    QgsProcessingParameterRasterLayer: "a raster layer, or a raster file that can be read",
-}
 
 
 def check_values(definitions: Sequence[QgsProcessingParameterDefinition], values: ParameterValues) -> None:
@@ -45,7 +36,7 @@ def check_values(definitions: Sequence[QgsProcessingParameterDefinition], values
         if isinstance(definition, QgsProcessingParameterNumber):
             values.optional_number(definition.name())
     if "EXTENT" in names:
-        values.extent(QgsCoordinateReferenceSystem())
+        values.extent(None)
     if "RAIL_CLASSES" in names:
         values.class_codes()
     if "ENGINE" in names:
@@ -53,30 +44,26 @@ def check_values(definitions: Sequence[QgsProcessingParameterDefinition], values
 
 
 def explain_invalid(
-    definition: QgsProcessingParameterDefinition, value: Any, context: QgsProcessingContext
+    parameter: Parameter, definition: QgsProcessingParameterDefinition, value: Any, context: QgsProcessingContext
 ) -> str | None:
     """Return what is wrong with a value and what to enter instead, or None if QGIS accepts the value.
 
     Parameters
     ----------
+    parameter : Parameter
+        What the definition is made for.
     definition : QgsProcessingParameterDefinition
     value : object
         As the user entered it; None means the default.
     context : QgsProcessingContext
     """
     given = definition.defaultValue() if value is None else value
-    if definition.checkValueIsAcceptable(given, context):
+    if definition.checkValueIsAcceptable(given, context) and not _is_no_number(definition, given):
         return None
-    shown = "empty" if given in (None, "") else given
-    return f"{definition.name()} can't be {shown}: give {_expected(definition)}."
+    return parameter.refusal(given)
 
 
-def _expected(definition: QgsProcessingParameterDefinition) -> str:
-    if isinstance(definition, QgsProcessingParameterNumber):
-        lowest, highest = definition.minimum(), definition.maximum()
-        return f"{lowest:g} or more" if highest == UNBOUNDED else f"a number from {lowest:g} to {highest:g}"
-    if isinstance(definition, QgsProcessingParameterEnum):
-        return f"one of its {len(definition.options())} choices, such as {definition.options()[0]}"
-    known = next((text for kind, text in EXPECTED.items() if isinstance(definition, kind)), None)
-    first_sentence = definition.help().split(". ")[0].rstrip(".")
-    return known or first_sentence[:1].lower() + first_sentence[1:]
+def _is_no_number(definition: QgsProcessingParameterDefinition, given: Any) -> bool:
+    """Return whether a text is given for a number: QGIS leaves out that of an optional one without a word."""
+    number = number_in(given) if isinstance(given, str) else None
+    return isinstance(definition, QgsProcessingParameterNumber) and number is not None and math.isnan(number)

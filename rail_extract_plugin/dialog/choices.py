@@ -19,7 +19,7 @@ WORDS = {
     "STRIPS": {AS_THEY_ARE: "Use them as they are", ALIGNED: "Align them"},
     "LEAVE_OUT": {OVERLAP: "Overlap of strips", SYNTHETIC: "Synthetic points"},
     "MODEL": {"AUTO": "Automatic", "base": "Network of the paper", "fast": "Smaller, faster network"},
-    "ENGINE": {"AUTO": "The faster one", "TORCH": "PyTorch", "OPENCV": "OpenCV"},
+    "ENGINE": {"AUTO": "PyTorch if it is installed", "TORCH": "PyTorch", "OPENCV": "OpenCV"},
     "DEVICE": {"AUTO": "GPU if there is one", "CPU": "Processor", "CUDA": "Nvidia GPU"},
     "DIRECTION": {"INCREASING": "Increase", "DECREASING": "Decrease"},
     "FORMAT": {

@@ -108,7 +108,7 @@ class CloudWidgetWrapper(WidgetWrapper):
         """Create the widget; it begins with the active cloud, or with the first one, if a cloud is needed at once."""
         if self.dialogType == QgsProcessingGui.WidgetType.Modeler:
             return CloudWidget(self._sources)
-        widget = CloudWidget(_layers)
+        widget = CloudWidget(loaded_clouds)
         project = QgsProject.instance()
         project.layersAdded.connect(widget.list_choices)
         project.layersRemoved.connect(widget.list_choices)
@@ -141,7 +141,7 @@ class CloudWidgetWrapper(WidgetWrapper):
         return [(source.friendlyIdentifier(model), source) for source in sources]
 
 
-def _layers() -> list[tuple[str, str]]:
+def loaded_clouds() -> list[tuple[str, str]]:
     """Return the names and ids of the loaded clouds."""
     layers = QgsProject.instance().mapLayers().values()
     return sorted((layer.name(), layer.id()) for layer in layers if isinstance(layer, QgsPointCloudLayer))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-import re
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import replace
 from pathlib import Path
@@ -20,20 +20,14 @@ from qgis.core import (
     QgsWkbTypes,
 )
 
+from ...core.disk import Destination
 from ...core.errors import ParameterError, RailExtractError, RasterError
-from ...core.parameters import AirborneParameters, GrowParameters, Parameters
-from ...core.standards import (
-    CUSTOM,
-    DEFAULT,
-    DETECT,
-    LAST_CLASS,
-    Gauge,
-    RailStandard,
-    is_class,
-    read_gauges,
-    resolve,
-)
-from ..reading.clouds import CloudSource, checked_crs, cloud_source
+from ...core.jobs import declaration as kinds
+from ...core.jobs.clouds import Bounds, CloudSource, checked_crs
+from ...core.jobs.declaration import Job
+from ...core.jobs.shared import DECREASING
+from ...core.jobs.values import Rows, Values
+from ..reading.clouds import cloud_source, points_folder
 from ..setup.interpreter import known_interpreter
 from ..systems import prepare_system, system
 from .passwords import masked
@@ -44,39 +38,10 @@ if TYPE_CHECKING:
     from ...core.airborne.survey import Guide
     from ...core.alignment.placed_axes import PlacedAxes
     from ...core.clouds.mask import Mask
+    from ...core.jobs.lines import Lines
     from ...core.output.raster_file import RasterHeader
+    from ...core.progress import Progress
     from ...core.tasks import Runner
-
-INCREASING, DECREASING = DIRECTIONS = ("INCREASING", "DECREASING")
-"""Whether kilometres increase from the first vertex of an axis."""
-
-NUMBERS = {
-    "SMOOTHING_XY": "smoothing_xy_m",
-    "SMOOTHING_Z": "smoothing_z_m",
-    "TOLERANCE_XY": "tolerance_xy_m",
-    "TOLERANCE_Z": "tolerance_z_m",
-    "CROWN_RADIUS": "crown_radius_m",
-    "MAX_GAP": "max_gap_m",
-    "GAP_ANGLE": "gap_angle_deg",
-    "SIMPLIFY_XY": "simplify_xy_m",
-    "SIMPLIFY_Z": "simplify_z_m",
-    "MIN_LENGTH": "min_length_m",
-    "CENTERLINE_TOLERANCE": "centerline_tolerance_m",
-}
-"""Attribute of the core's `Parameters` for each number of the interface."""
-
-GROWTH = {
-    "SEARCH": "search_m",
-    "THICKNESS": "thickness_m",
-    "WINDOW": "window_m",
-    "MIN_HEIGHT": "min_height_m",
-    "TOLERANCE_Z": "tolerance_z_m",
-    "MAX_LENGTH": "max_length_m",
-}
-"""The same for `GrowParameters`; TOLERANCE_Z has another default there."""
-
-AIRBORNE = {"REACH": "reach_m", "FOOTPRINT": "footprint_m", "RAIL_HEIGHT": "rail_height_m"}
-"""The same for `AirborneParameters`."""
 
 TYPES_WITHOUT_LINES = (
     QgsWkbTypes.GeometryType.PointGeometry,
@@ -85,10 +50,8 @@ TYPES_WITHOUT_LINES = (
 )
 """Types of layers without lines; a layer of unknown type may have lines."""
 
-CHOICES = {"ENGINE": "engine", "DEVICE": "device", "MODEL": "model", "STRIPS": "strips"}
 
-
-class ParameterValues:
+class ParameterValues(Values):
     """Values of the parameters of one run.
 
     Parameters
@@ -108,6 +71,76 @@ class ParameterValues:
         self, algorithm: QgsProcessingAlgorithm, parameters: dict[str, Any], context: QgsProcessingContext
     ) -> None:
         self.algorithm, self.parameters, self.context = algorithm, parameters, context
+        self.job: Job = algorithm.JOB
+        self._opened: dict[str, Any] = {}
+        self._command = ""
+
+    def __getitem__(self, name: str) -> Any:
+        """Return the value of a parameter, by its kind; None if it is empty, and the WKT of a coordinate system."""
+        one = next(one for one in self.job.parameters if one.name == name)
+        if isinstance(one, kinds.Number):
+            number = self.optional_number(name) if one.optional else self.number(name)
+            return int(number) if one.whole and number is not None else number
+        return READERS[type(one)](self, one)
+
+    @property
+    def command(self) -> str:
+        """What repeats the run, without passwords."""
+        self._command = self._command or masked(self.algorithm.asPythonCommand(self.parameters, self.context))
+        return self._command
+
+    def follow(self, prepared: ParameterValues) -> None:
+        """Take over what was read in the main thread."""
+        self._opened, self._command = prepared._opened, prepared.command
+
+    def open_sources(self) -> None:
+        """Find the clouds and open the layers, in the main thread.
+
+        Raises
+        ------
+        RailExtractError
+            One can't be read, has no lines where lines are needed, or has them in degrees.
+        """
+        for one in self.job.parameters:
+            if isinstance(one, kinds.Cloud) and self.filled(one.name):
+                self.cloud(one.name)
+            elif isinstance(one, kinds.LayerInput) and not one.transformed and self.filled(one.name):
+                read = self._lines_source if one.kinds == (kinds.LINE,) else self.table
+                self._opened[one.name] = read(one.name)
+
+    def title(self, name: str) -> str:
+        """Return the name of the layer that was given for an input, to show to users; empty without one."""
+        return self._opened[name].sourceName() if name in self._opened else ""
+
+    def prepare(self, crs_wkt: str | None) -> None:
+        """Build the coordinate system of the results in this thread, which is the main one."""
+        prepare_system(crs_wkt)
+
+    def path(self, name: str) -> Path:
+        """Return the file that an output names; QGIS chooses that of a temporary one during the run."""
+        return Path(self.output_file(name))
+
+    def destination(self, name: str) -> Destination:
+        """Return the file of an output that is wanted."""
+        return self.algorithm.destinations.get(name) or Destination.at(self.path(name))
+
+    def system(self, name: str) -> str | None:
+        """Return the coordinate system of a layer as WKT; None if it has none."""
+        from ..reading.line_layers import wkt_of
+
+        return wkt_of(self._opened[name].sourceCrs()) or None
+
+    def rows(self, name: str, progress: Progress) -> Rows:
+        """Read the fields of a layer."""
+        from ..reading.line_layers import rows_of
+
+        return rows_of(self._opened[name], progress)
+
+    def lines(self, name: str, progress: Progress) -> Lines:
+        """Read the lines of a layer."""
+        from ..reading.line_layers import read_lines
+
+        return read_lines(self._opened[name], progress, name)
 
     def number(self, name: str) -> float:
         """Read a number.
@@ -161,14 +194,6 @@ class ParameterValues:
         """Return the file of an output; QGIS chooses the name of a temporary one during the run."""
         return self.algorithm.parameterAsFileOutput(self.parameters, name, self.context)
 
-    def command(self) -> str:
-        """Return the command that repeats the run, without passwords."""
-        return masked(self.algorithm.asPythonCommand(self.parameters, self.context))
-
-    def rails_only(self) -> bool:
-        """Return whether CONTENT leaves out what is not on rails."""
-        return self.algorithm.parameterAsEnum(self.parameters, "CONTENT", self.context) == 1
-
     def raster(self, name: str) -> tuple[Path, RasterHeader]:
         """Return the file of a raster and its header.
 
@@ -187,7 +212,7 @@ class ParameterValues:
         prepare_system(header.frame.crs_wkt)
         return path, header
 
-    def lines(self, name: str) -> QgsProcessingFeatureSource:
+    def _lines_source(self, name: str) -> QgsProcessingFeatureSource:
         """Return a line layer.
 
         Raises
@@ -202,55 +227,11 @@ class ParameterValues:
         prepare_system(wkt_of(source.sourceCrs()))
         return source
 
-    def guide(self, cloud: CloudSource) -> tuple[np.ndarray, ...]:
-        """Read the lines of GUIDE, in the coordinate system of the cloud; none if it is empty.
+    def axes(self, crs_wkt: str | None) -> PlacedAxes:
+        """Read AXIS and what states its kilometres, in a coordinate system."""
+        return self._once("AXIS", lambda: self._axes(system(crs_wkt)))
 
-        Raises
-        ------
-        RailExtractError
-            The layer has no lines, or they can't be transformed; or ONLY_GUIDED is set without GUIDE.
-        """
-        from ..reading.line_layers import read_guide
-
-        if not self.filled("GUIDE"):
-            if self.flag("ONLY_GUIDED"):
-                raise ParameterError("ONLY_GUIDED needs lines to compare tracks with: choose GUIDE.")
-            return ()
-        return read_guide(self._line_source("GUIDE"), system(checked_crs(cloud)), self.context)
-
-    def tracks_meant(self, cloud: CloudSource) -> tuple[Guide, ...]:
-        """Read the lines of GUIDE with what the layer states of them; none if it is empty.
-
-        Raises
-        ------
-        RailExtractError
-            The layer has no lines, or they can't be transformed.
-        """
-        from ..reading.line_layers import read_tracks_meant
-
-        if not self.filled("GUIDE"):
-            return ()
-        return read_tracks_meant(self._line_source("GUIDE"), system(checked_crs(cloud)), self.context)
-
-    def airborne(self, standard: RailStandard) -> AirborneParameters:
-        """Read how tracks are looked for in an airborne cloud."""
-        lengths = {field: self.number(name) for name, field in AIRBORNE.items()}
-        return AirborneParameters(standard.gauge_m, standard.head_width_m, **lengths)
-
-    def has_axis(self) -> bool:
-        """Return whether AXIS is filled in.
-
-        Raises
-        ------
-        ParameterError
-            It is not, but what states its kilometres is.
-        """
-        lone = next((name for name in ("START_KM", "POSTS", "JUMPS") if self.filled(name)), None)
-        if lone and not self.filled("AXIS"):
-            raise ParameterError(f"{lone} needs the line that it applies to: choose AXIS.")
-        return self.filled("AXIS")
-
-    def axes(self, crs: QgsCoordinateReferenceSystem) -> PlacedAxes:
+    def _axes(self, crs: QgsCoordinateReferenceSystem) -> PlacedAxes:
         """Read AXIS and what states its kilometres, in a coordinate system.
 
         Raises
@@ -278,36 +259,6 @@ class ParameterValues:
             raise RailExtractError(f"{name} is not a readable layer: choose another one.")
         return source
 
-    def seeds(self, cloud: CloudSource) -> tuple[np.ndarray, ...]:
-        """Read SEEDS and SEED, in the coordinate system of the cloud.
-
-        Raises
-        ------
-        RailExtractError
-            There are none, or they can't be transformed.
-        """
-        from ..reading.line_layers import read_place, read_seeds
-
-        if not self.filled("SEEDS") and not self.filled("SEED"):
-            raise ParameterError("A rail is followed from seeds: choose a layer for SEEDS, or pick a point for SEED.")
-        crs = system(checked_crs(cloud))
-        found: tuple[np.ndarray, ...] = ()
-        if self.filled("SEEDS"):
-            source = self.algorithm.parameterAsSource(self.parameters, "SEEDS", self.context)
-            if source is None:
-                raise RailExtractError("SEEDS is not a readable layer: give a layer of points or lines.")
-            found = read_seeds(source, crs, self.context)
-        if self.filled("SEED"):
-            place = self.algorithm.parameterAsPoint(self.parameters, "SEED", self.context)
-            own = self.algorithm.parameterAsPointCrs(self.parameters, "SEED", self.context)
-            found = (*found, read_place(place, own, crs, self.context))
-        return found
-
-    def growth(self) -> GrowParameters:
-        """Read how rails are followed."""
-        lengths = {field: self.number(name) for name, field in GROWTH.items()}
-        return GrowParameters(both=self.flag("BOTH"), max_outliers=int(self.number("MAX_OUTLIERS")), **lengths)
-
     def _mask(self, cloud: CloudSource) -> Mask | None:
         """Read the polygons of MASK, in the coordinate system of the cloud.
 
@@ -327,9 +278,7 @@ class ParameterValues:
 
     def _left_out(self) -> tuple[str, ...]:
         """Read LEAVE_OUT; nothing where an algorithm does not have it."""
-        if not self._has("LEAVE_OUT"):
-            return ()
-        return tuple(self.algorithm.parameterAsEnumStrings(self.parameters, "LEAVE_OUT", self.context))
+        return self["LEAVE_OUT"] if self.has("LEAVE_OUT") else ()
 
     def _line_source(self, name: str) -> QgsProcessingFeatureSource:
         """Return a layer that may have lines."""
@@ -343,13 +292,56 @@ class ParameterValues:
             )
         return source
 
-    def cloud(self, name: str) -> CloudSource:
+    def cloud(self, name: str = "INPUT") -> CloudSource:
         """Return the files of a cloud; the parameter CRS, if any, applies to files that state no coordinate system."""
-        source = cloud_source(self.parameters.get(name), self.context)
-        crs = self.projected_crs()
-        source = replace(source, crs_wkt=crs.toWkt()) if crs.isValid() else source
-        prepare_system(checked_crs(source))
-        return replace(source, mask=self._mask(source), leave_out=self._left_out())
+        if name not in self._opened:
+            source = cloud_source(self.parameters.get(name), self.context)
+            crs = self.projected_crs()
+            source = replace(source, crs_wkt=crs.toWkt()) if crs.isValid() else source
+            prepare_system(checked_crs(source))
+            self._opened[name] = replace(source, mask=self._mask(source), leave_out=self._left_out())
+        return self._opened[name]
+
+    def scratch(self) -> AbstractContextManager[Path]:
+        """Provide a folder for the points of a run."""
+        return points_folder()
+
+    def lines_along(self, name: str, crs_wkt: str | None) -> Sequence[np.ndarray]:
+        """Read lines that show places along tracks, (k, 2) each, in a coordinate system."""
+        from ..reading.line_layers import read_guide
+
+        return self._once(name, lambda: read_guide(self._line_source(name), system(crs_wkt), self.context))
+
+    def guides(self, name: str, crs_wkt: str | None) -> Sequence[Guide]:
+        """Read such lines with what they state of their tracks."""
+        from ..reading.line_layers import read_tracks_meant
+
+        return self._once(name, lambda: read_tracks_meant(self._line_source(name), system(crs_wkt), self.context))
+
+    def seeds(self, crs_wkt: str | None) -> Sequence[np.ndarray]:
+        """Read SEEDS and SEED in a coordinate system: points, (1, 2), and lines, (k, 2)."""
+        return self._once("SEEDS", lambda: self._seeds(system(crs_wkt)))
+
+    def _seeds(self, crs: QgsCoordinateReferenceSystem) -> list[np.ndarray]:
+        from ..reading.line_layers import read_place, read_seeds
+
+        found: list[np.ndarray] = []
+        if self.filled("SEEDS"):
+            source = self.algorithm.parameterAsSource(self.parameters, "SEEDS", self.context)
+            if source is None:
+                raise RailExtractError("SEEDS is not a readable layer: give a layer of points or lines.")
+            found += read_seeds(source, crs, self.context)
+        if self.filled("SEED"):
+            place = self.algorithm.parameterAsPoint(self.parameters, "SEED", self.context)
+            own = self.algorithm.parameterAsPointCrs(self.parameters, "SEED", self.context)
+            found.append(read_place(place, own, crs, self.context))
+        return found
+
+    def _once(self, name: str, read: Callable[[], Any]) -> Any:
+        """Return what was read in the main thread."""
+        if name not in self._opened:
+            self._opened[name] = read()
+        return self._opened[name]
 
     def projected_crs(self) -> QgsCoordinateReferenceSystem:
         """Return the coordinate system CRS, an invalid one if it is empty.
@@ -368,8 +360,8 @@ class ParameterValues:
             )
         return crs
 
-    def extent(self, crs: QgsCoordinateReferenceSystem) -> tuple[float, float, float, float] | None:
-        """Read EXTENT in `crs`: west, south, east and north limits.
+    def extent(self, crs_wkt: str | None) -> Bounds | None:
+        """Read EXTENT in a coordinate system: west, south, east and north limits.
 
         Raises
         ------
@@ -378,71 +370,12 @@ class ParameterValues:
         """
         if not self.filled("EXTENT"):
             return None
-        extent = self.algorithm.parameterAsExtent(self.parameters, "EXTENT", self.context, crs)
+        extent = self.algorithm.parameterAsExtent(self.parameters, "EXTENT", self.context, system(crs_wkt))
         if extent.isEmpty() or not extent.isFinite():
             raise ParameterError(
                 "EXTENT has no area, or an infinite one: give a rectangle as xmin,xmax,ymin,ymax, or leave it empty."
             )
         return extent.xMinimum(), extent.yMinimum(), extent.xMaximum(), extent.yMaximum()
-
-    def engine(self) -> str:
-        """Read ENGINE, and check that it is installed and runs on DEVICE."""
-        from ...core.frpdf.engine import choose_engine
-
-        return choose_engine(self.choice("ENGINE"), self.choice("DEVICE"))
-
-    def weights(self) -> Path | None:
-        """Read METHOD and WEIGHTS: the weights of the network that finds rail points, or None for geometry.
-
-        Raises
-        ------
-        ParameterError, ModelError
-            They contradict each other, or can't be used.
-        """
-        from ...core.learned.model import weights_for
-
-        return weights_for(self.choice("METHOD"), self.file("WEIGHTS"))
-
-    def class_codes(self) -> tuple[int, ...]:
-        """Read RAIL_CLASSES."""
-        return class_numbers(self.text("RAIL_CLASSES"), "RAIL_CLASSES")
-
-    def detects(self) -> bool:
-        """Return whether the points are to tell the rail standard."""
-        return self.choice("STANDARD") == DETECT
-
-    def standard(self, detected: str | None = None) -> RailStandard:
-        """Read STANDARD, or take the one that was detected; GAUGE and HEAD_WIDTH override its values."""
-        name = detected or self.choice("STANDARD")
-        return resolve(name, self.optional_number("GAUGE"), self.optional_number("HEAD_WIDTH"))
-
-    def head_width_m(self) -> float:
-        """Read HEAD_WIDTH, or the value of STANDARD."""
-        head_width_mm = self.optional_number("HEAD_WIDTH")
-        if head_width_mm is None and self.choice("STANDARD") == CUSTOM:
-            raise ParameterError("STANDARD CUSTOM needs the railhead width, in millimetres: fill in HEAD_WIDTH.")
-        return resolve(DEFAULT if head_width_mm else self.choice("STANDARD"), None, head_width_mm).head_width_m
-
-    def other_gauges(self, standard: RailStandard) -> tuple[Gauge, ...]:
-        """Read OTHER_GAUGES, and check that they can be distinguished from each other and from the standard's gauge."""
-        own = self._has("CENTERLINE_TOLERANCE")
-        tolerance_m = self.number("CENTERLINE_TOLERANCE") if own else Parameters.centerline_tolerance_m
-        return read_gauges(self.text("OTHER_GAUGES"), "OTHER_GAUGES", standard, tolerance_m, own)[1:]
-
-    def settings(self, standard: RailStandard, other_gauges: tuple[Gauge, ...] = ()) -> Parameters:
-        """Return the algorithm's parameters for the core, with the core's defaults for all others."""
-        given: dict[str, Any] = {}
-        for name, field in NUMBERS.items():
-            if self._has(name):
-                optional = getattr(Parameters, field) is None
-                given[field] = self.optional_number(name) if optional else self.number(name)
-        given.update({field: self.choice(name) for name, field in CHOICES.items() if self._has(name)})
-        if self._has("ITERATIONS"):
-            given["passes"] = int(self.number("ITERATIONS"))
-        return Parameters(standard.gauge_m, standard.head_width_m, **given).with_gauges(other_gauges)
-
-    def _has(self, name: str) -> bool:
-        return self.algorithm.parameterDefinition(name) is not None
 
 
 def destination_text(value: Any, context: QgsProcessingContext) -> str:
@@ -454,19 +387,26 @@ def destination_text(value: Any, context: QgsProcessingContext) -> str:
     return value or ""
 
 
-def class_numbers(text: str, what: str) -> tuple[int, ...]:
-    """Parse classes such as "10,11"; `what` is the name of the parameter, for the error.
-
-    Raises
-    ------
-    ParameterError
-        The text is not a list of classes, or is empty.
-    """
-    words = _words(text)
-    if not words or not all(map(is_class, words)):
-        raise ParameterError(f'{what} "{text}" must be whole numbers from 0 to {LAST_CLASS} such as 10 or 10,11.')
-    return tuple(dict.fromkeys(int(word) for word in words))
+def _chosen(values: ParameterValues, one: kinds.Choice) -> Any:
+    """Read a choice: one id, several, or the place of one."""
+    algorithm, given = values.algorithm, (values.parameters, one.name, values.context)
+    if one.numbered:
+        return algorithm.parameterAsEnum(*given)
+    return tuple(algorithm.parameterAsEnumStrings(*given)) if one.several else values.choice(one.name)
 
 
-def _words(text: str) -> list[str]:
-    return [word for word in re.split(r"[;,\s]+", text) if word]
+def _system(values: ParameterValues, one: kinds.System) -> str | None:
+    from ..reading.line_layers import wkt_of
+
+    return wkt_of(values.projected_crs()) or None
+
+
+READERS: dict[type, Callable[[ParameterValues, Any], Any]] = {
+    kinds.Flag: lambda values, one: values.flag(one.name),
+    kinds.Choice: _chosen,
+    kinds.Text: lambda values, one: values.text(one.name),
+    kinds.FieldInput: lambda values, one: values.text(one.name),
+    kinds.FileInput: lambda values, one: values.file(one.name),
+    kinds.System: _system,
+}
+"""Functions that read a value, by the kind of the parameter."""

@@ -6,8 +6,8 @@ SECTIONS = {
     "Cloud": ("MERGE_CLASSES", "CLASSES", "EXTENT", "MASK", "CRS", "LEAVE_OUT"),
     "Raw clouds": (
         *("METHOD", "WEIGHTS", "SEEDS", "SEED", "GUIDE", "GUIDE_DISTANCE", "ONLY_GUIDED", "KEEP_SINGLE", "RAIL_CLASS"),
-        *("CONTENT", "RESET", "START", "BOTH", "SEARCH", "THICKNESS", "WINDOW", "MIN_HEIGHT", "MAX_OUTLIERS"),
-        "MAX_LENGTH",
+        *("CONTENT", "RESET", "START", "MINUTES", "BOTH", "SEARCH", "THICKNESS", "WINDOW", "MIN_HEIGHT"),
+        *("MAX_OUTLIERS", "MAX_LENGTH"),
     ),
     "Network": ("MODEL", "ITERATIONS", "ENGINE", "DEVICE"),
     "Lines": (

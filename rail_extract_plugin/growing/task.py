@@ -9,13 +9,20 @@ from typing import TYPE_CHECKING
 from qgis.core import QgsPointXY, QgsTask
 
 from ...core.errors import Cancelled, OffCloudError, OffRailError, RailExtractError
+from ...core.jobs.clouds import CloudSource
 from ...core.parameters import GrowParameters
-from ...core.standards import SEARCHED_CLASSES, RailStandard
+from ...core.standards import RAIL_CLASS, SEARCHED_CLASSES, RailStandard
 from ..feedback import TaskProgress
-from ..reading.clouds import CloudSource, points_folder
+from ..reading.clouds import points_folder
 
 if TYPE_CHECKING:
     import numpy as np
+
+
+CLASSIFIED = (
+    f"This cloud has points of class {RAIL_CLASS}, which are those on rails: Extract Rails uses them as they are. Grow "
+    "Rails is for clouds whose rail points nobody has classified."
+)
 
 
 @dataclass(frozen=True)
@@ -65,7 +72,7 @@ class GrowTask(QgsTask):
         except OffCloudError:
             self._shown = Shown(text="The cloud has no point here: click on a rail of the cloud.")
         except OffRailError:
-            self._shown = Shown(text=_missed())
+            self._shown = Shown(text=CLASSIFIED if has_rail_points(self._cloud) else _missed())
         except RailExtractError as error:
             self._shown = Shown(text=str(error))
         except Exception as error:
@@ -85,7 +92,8 @@ class GrowTask(QgsTask):
         settings = GrowSettings(self._standard.gauge_m, self._standard.head_width_m)
         seed = np.array([[self._seed.x(), self._seed.y()]])
         with points_folder() as folder, one_thread(*blas()):
-            _, (growth,) = grow_all(request, [seed], settings, folder, TaskProgress(self))
+            _, growths = grow_all(request, [seed], settings, folder, TaskProgress(self))
+        (growth,) = growths.grown
         to_crs = request.zero.to_crs
         return Shown(
             tuple(to_crs(rail.xyz)[:, :2] for rail in growth.rails),
@@ -97,6 +105,21 @@ class GrowTask(QgsTask):
         """Pass on what grew, in the main thread."""
         if result:
             self._done(self._shown)
+
+
+def has_rail_points(cloud: CloudSource) -> bool:
+    """Return whether some of the first points of a cloud have the class of rail points; takes less than a second.
+
+    Raises
+    ------
+    CloudError
+        The file is damaged.
+    """
+    from ...core.clouds.readers import first_header, read_points
+    from ...core.progress import SILENT
+
+    _, codes, _, _ = next(read_points(first_header(cloud.paths).path, SILENT, cloud.leave_out))
+    return bool((codes == RAIL_CLASS).any())
 
 
 def _missed() -> str:

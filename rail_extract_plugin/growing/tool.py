@@ -28,26 +28,31 @@ from qgis.gui import QgsMapCanvas, QgsMapMouseEvent, QgsMapTool, QgsMessageBar, 
 from qgis.PyQt import sip
 from qgis.PyQt.QtCore import QObject, Qt
 from qgis.PyQt.QtGui import QColor, QIcon
-from qgis.PyQt.QtWidgets import QAction, QComboBox, QFileDialog, QWidget
+from qgis.PyQt.QtWidgets import QAction, QComboBox, QWidget
 
 from ...core.errors import RailExtractError
+from ...core.jobs.clouds import CloudSource, checked_crs
+from ...core.jobs.grow_rail_points import JOB
 from ...core.standards import DEFAULT, STANDARDS
-from ..algorithms.grow_rail_points import GrowRailPoints
-from ..dialog.cloud_parameter import file_filter
+from ..dialog.cloud_widget import CloudWidget, loaded_clouds
 from ..dialog.standard_setting import LAST
 from ..dialog.wheel import ignore_wheel
 from ..notices import notices
 from ..paths import ICONS
-from ..reading.clouds import checked_crs, cloud_source
+from ..reading.clouds import cloud_source
 from ..setup.dependencies import explain_missing, missing_packages
 from ..systems import system
-from .task import GrowTask, Shown
+from .task import CLASSIFIED, GrowTask, Shown, has_rail_points
 
 COLOUR, WIDTH, END_SIZE = "#e64a19", 3, 11
 """Colour and width of the rails, and size of the marks at their ends, in pixels."""
 
 MESSAGE_S = 10
 """Time for which a message is shown."""
+
+
+CLOUD_WIDTH = 320
+"""Pixels for the cloud in the toolbar, with its two buttons."""
 
 
 @dataclass
@@ -115,8 +120,6 @@ class GrowRails(QObject):
     ----------
     canvas : QgsMapCanvas
     messages : QgsMessageBar
-    active_layer : callable
-        Returns the layer that is selected in the layer panel.
     parent : QWidget
     """
 
@@ -124,24 +127,27 @@ class GrowRails(QObject):
         self,
         canvas: QgsMapCanvas,
         messages: QgsMessageBar,
-        active_layer: Callable[[], QgsMapLayer | None],
         parent: QWidget,
     ) -> None:
         super().__init__(parent)
-        self._canvas, self._messages, self._active_layer = canvas, messages, active_layer
-        self._cloud: QgsPointCloudLayer | str | None = None
+        self._canvas, self._messages = canvas, messages
+        self._cloud: str | None = None
         self._task: GrowTask | None = None
         self.seeds: list[Seed] = []
         self._seed_layer_id = ""
         self.dialog: QWidget | None = None
         self.message = ""
         self.tool = ClickTool(canvas, self.click, self.undo, self.accept)
-        self.grow_action = self._action("growrailpoints.svg", "Grow Rails", lambda: canvas.setMapTool(self.tool))
+        self.grow_action = self._action("growrailpoints.svg", "Grow Rails", self._begin)
         self.grow_action.setCheckable(True)
         self.grow_action.setToolTip("Click rails on a point cloud and see how far they can be followed")
         self.tool.setAction(self.grow_action)
         self.undo_action = self._action("undo.svg", "Undo Last Rail", self.undo)
         self.accept_action = self._action("accept.svg", "Classify Grown Rails…", self.accept)
+        self.clouds = CloudWidget(loaded_clouds)
+        self.clouds.setToolTip("Point cloud in which rails grow: a layer, or the path of a file or folder")
+        self.clouds.setMaximumWidth(CLOUD_WIDTH)
+        self.clouds.changed.connect(self._warn_of_classes)
         self.standards = QComboBox()
         self.standards.setToolTip("Rail standard of the rails that are clicked")
         for name, standard in STANDARDS.items():
@@ -150,8 +156,45 @@ class GrowRails(QObject):
         self._choose_standard(QgsSettings().value(LAST))
         notices.standard_used.connect(self._choose_standard)
         ignore_wheel(self.standards)
-        QgsProject.instance().layersRemoved.connect(self._forget_removed)
+        self._follow_project(True)
+        self._select(canvas.currentLayer())
         self._enable()
+
+    def _follow_project(self, begin: bool) -> None:
+        """Begin or stop to follow which clouds the project has, and which one is selected."""
+        project, to_list = QgsProject.instance(), self.clouds.list_choices
+        followed = ((project.layersAdded, to_list), (project.layersRemoved, to_list))
+        for signal, do in (
+            *followed,
+            (project.layersRemoved, self._forget_removed),
+            (self._canvas.currentLayerChanged, self._select),
+        ):
+            if begin:
+                signal.connect(do)
+            else:
+                signal.disconnect(do)
+
+    def _select(self, layer: QgsMapLayer | None) -> None:
+        """Take a cloud that is selected in the layer panel; without one, the only cloud of the project."""
+        clouds = dict(loaded_clouds())
+        if isinstance(layer, QgsPointCloudLayer):
+            self.clouds.set_value(layer.id())
+        elif self.clouds.value() is None and len(clouds) == 1:
+            self.clouds.set_value(*clouds.values())
+
+    def _begin(self) -> None:
+        """Take clicks on the map from now on."""
+        self._canvas.setMapTool(self.tool)
+        self._warn_of_classes()
+
+    def _warn_of_classes(self) -> None:
+        """Say at once if rails need not be grown, because the cloud has rail points already."""
+        value = self.clouds.value()
+        if value is None or self._canvas.mapTool() is not self.tool:
+            return
+        with suppress(RailExtractError):  # said when rails are clicked
+            if has_rail_points(_source(value)):
+                self._say(CLASSIFIED)
 
     def _choose_standard(self, name: str | None) -> None:
         """Choose the standard of a run, unless the toolbar does not have it, such as one that was to be detected."""
@@ -184,8 +227,8 @@ class GrowRails(QObject):
             value = self._chosen_cloud()
             if value is None:
                 return
-            cloud = cloud_source(value, QgsProcessingContext())
-            crs = value.crs() if isinstance(value, QgsPointCloudLayer) else system(checked_crs(cloud))
+            cloud, layer = _source(value), QgsProject.instance().mapLayer(value)
+            crs = layer.crs() if layer is not None else system(checked_crs(cloud))
         except RailExtractError as error:
             self._say(str(error))
             return
@@ -200,38 +243,29 @@ class GrowRails(QObject):
         QgsApplication.taskManager().addTask(self._task)
         self._enable()
 
-    def _chosen_cloud(self) -> QgsPointCloudLayer | str | None:
-        """Return the cloud to grow in: the selected layer, the only one of the project, or a file.
-
-        None if the user was asked for a file and chose none.
+    def _chosen_cloud(self) -> str | None:
+        """Return the layer or the path to grow in; None if the user was asked for a file and chose none.
 
         Raises
         ------
         RailExtractError
-            There are several layers, seeds of another cloud wait, or packages are missing.
+            There are several clouds, seeds of another cloud wait, or packages are missing.
         """
-        missing = missing_packages(GrowRailPoints.NEEDS)
+        missing = missing_packages(JOB.needs)
         if missing:
             raise RailExtractError(explain_missing("Grow Rails", missing, []))
-        active, layers = self._active_layer(), QgsProject.instance().mapLayers().values()
-        clouds = [one for one in layers if isinstance(one, QgsPointCloudLayer)]
-        if len(clouds) > 1 and active not in clouds:
-            raise RailExtractError("Select a point cloud in the layer panel, then click on a rail.")
-        if clouds:
-            chosen = active if active in clouds else clouds[0]
-        else:
-            chosen = self._cloud if isinstance(self._cloud, str) else self._ask_for_file()
+        if self.clouds.value() is None:
+            self._select(self._canvas.currentLayer())
+        if self.clouds.value() is None and loaded_clouds():
+            raise RailExtractError("Choose the point cloud in the toolbar, or select its layer, then click on a rail.")
+        if self.clouds.value() is None:
+            self.clouds.file_button.click()
+        chosen = self.clouds.value()
         if self.seeds and chosen != self._cloud:
             raise RailExtractError(
                 "Rails of another point cloud are still shown: classify or undo them before you click on this one."
             )
         return chosen
-
-    def _ask_for_file(self) -> str | None:
-        """Let the user choose the file of a cloud that this QGIS does not show."""
-        title = "Select the point cloud in which rails grow"
-        path, _ = QFileDialog.getOpenFileName(self.parent(), title, "", file_filter())
-        return path or None
 
     def _show(self, seed: Seed, shown: Shown) -> None:
         """Draw what grew, or take the click back if nothing did."""
@@ -279,11 +313,11 @@ class GrowRails(QObject):
         if self.is_growing or not self.seeds or self._cloud is None:
             return
         values = {
-            "INPUT": self._cloud if isinstance(self._cloud, str) else self._cloud.id(),
+            "INPUT": self._cloud,
             "SEEDS": self._seed_layer().id(),
             "STANDARD": self.standards.currentData(),
         }
-        self.dialog = open_dialog(GrowRailPoints.NAME, values, self.parent())
+        self.dialog = open_dialog(JOB.name, values, self.parent())
         self.dialog.algorithmFinished.connect(self._clear_after)
 
     def _clear_after(self, successful: bool, results: dict[str, Any]) -> None:
@@ -313,7 +347,7 @@ class GrowRails(QObject):
         self.cancel()
         for seed in list(self.seeds):
             self._remove(seed)
-        self._cloud = self._cloud if isinstance(self._cloud, str) else None
+        self._cloud = None
         self._enable()
 
     def cancel(self) -> None:
@@ -325,7 +359,7 @@ class GrowRails(QObject):
 
     def close_for_good(self) -> None:
         """Stop and clean the map, before the tool is deleted."""
-        QgsProject.instance().layersRemoved.disconnect(self._forget_removed)
+        self._follow_project(False)
         notices.standard_used.disconnect(self._choose_standard)
         self.clear()
         if self._canvas.mapTool() is self.tool:
@@ -344,7 +378,7 @@ class GrowRails(QObject):
 
     def _forget_removed(self, ids: Sequence[str]) -> None:
         """Take all clicks back if their layer was removed."""
-        if isinstance(self._cloud, QgsPointCloudLayer) and (sip.isdeleted(self._cloud) or self._cloud.id() in ids):
+        if self._cloud in ids:
             self.clear()
 
     def _say(self, text: str) -> None:
@@ -356,3 +390,8 @@ class GrowRails(QObject):
         """Enable what can be done."""
         self.undo_action.setEnabled(bool(self.seeds))
         self.accept_action.setEnabled(bool(self.seeds) and not self.is_growing)
+
+
+def _source(value: str) -> CloudSource:
+    """Return the cloud of a layer, given by its id, or of a path."""
+    return cloud_source(QgsProject.instance().mapLayer(value) or value, QgsProcessingContext())

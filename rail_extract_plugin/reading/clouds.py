@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Optional
+from typing import Any
 
 from qgis.core import (
     QgsCoordinateReferenceSystem,
@@ -18,41 +17,8 @@ from qgis.core import (
 )
 
 from ...core.errors import CloudError
-from ...core.progress import Progress
+from ...core.jobs.clouds import CloudSource
 from ...core.scratch import scratch_folder, sweep
-from ...core.standards import RAIL_CLASS
-from ..systems import system
-
-if TYPE_CHECKING:
-    from ...core.clouds.mask import Mask
-    from ...core.clouds.points import RailPoints, Request
-    from ...core.squares.spool import SpooledPoints
-
-Bounds = tuple[float, float, float, float]
-"""Smallest x, smallest y, largest x, largest y."""
-
-BoundsIn = Callable[[QgsCoordinateReferenceSystem], Optional[Bounds]]
-"""Returns the area to read in a given coordinate system; None to read everything."""
-
-
-@dataclass(frozen=True)
-class CloudSource:
-    """The files of a cloud.
-
-    Attributes
-    ----------
-    paths : tuple of Path
-        Files, virtual point clouds, or folders of tiles.
-    crs_wkt : str or None
-        Coordinate system set by the user, used where files state none.
-    mask : Mask or None
-        Area to which the points are limited, in the coordinate system of the cloud.
-    """
-
-    paths: tuple[Path, ...]
-    crs_wkt: str | None = None
-    mask: Mask | None = None
-    leave_out: tuple[str, ...] = ()
 
 
 def cloud_source(value: Any, context: QgsProcessingContext) -> CloudSource:
@@ -105,67 +71,6 @@ def _system_name(crs: QgsCoordinateReferenceSystem) -> str:
     return crs.authid() or crs.description() or "no coordinate system"
 
 
-def read_points(
-    source: CloudSource,
-    class_codes: Sequence[int],
-    bounds: BoundsIn,
-    progress: Progress,
-) -> tuple[RailPoints, ...]:
-    """Read the points on the heads of the rail classes.
-
-    Parameters
-    ----------
-    source : CloudSource
-    class_codes : sequence of int
-    bounds : callable
-        Returns the extent to read, given the cloud's coordinate system.
-    progress : Progress
-    """
-    from ...core.clouds.points import read_requested
-    from ...core.heads.on_heads import heads_of
-
-    found = read_requested(request_points(source, class_codes, bounds, progress), progress)
-    return tuple(heads_of(points) for points in found)
-
-
-def spool_points(
-    source: CloudSource,
-    class_codes: Sequence[int],
-    bounds: BoundsIn,
-    side_m: float,
-    folder: Path,
-    progress: Progress,
-) -> tuple[SpooledPoints, ...]:
-    """Sort the points of the rail classes into squares on disk, so that a cloud of any size fits.
-
-    Parameters
-    ----------
-    source, class_codes, bounds, progress
-        See `read_points`.
-    side_m : float
-        Side of the squares.
-    folder : Path
-        Where to write them.
-    """
-    from ...core.squares.spool import spool
-
-    return spool(request_points(source, class_codes, bounds, progress), side_m, folder, progress)
-
-
-def request_points(source: CloudSource, class_codes: Sequence[int], bounds: BoundsIn, progress: Progress) -> Request:
-    """Check which points of which files are to be read, and read the headers of the files.
-
-    Parameters
-    ----------
-    source, class_codes, bounds, progress
-        See `read_points`.
-    """
-    from ...core.clouds.points import ask
-
-    request = ask(source.paths, class_codes, source.crs_wkt, bounds(system(crs_of(source))), progress)
-    return replace(request, mask=source.mask, leave_out=source.leave_out)
-
-
 @contextmanager
 def points_folder() -> Iterator[Path]:
     """Create a temporary folder for the points of a run, next to that of QGIS, and remove those of killed runs."""
@@ -173,32 +78,6 @@ def points_folder() -> Iterator[Path]:
     sweep(parent)
     with scratch_folder(parent) as folder:
         yield folder
-
-
-def crs_of(source: CloudSource) -> str | None:
-    """Return the coordinate system of a cloud's first file as WKT; reading the points checks that all files agree."""
-    from ...core.clouds.readers import first_header
-
-    return first_header(source.paths).crs_wkt or source.crs_wkt
-
-
-def checked_crs(source: CloudSource) -> str | None:
-    """Return the coordinate system of a cloud's points as WKT, by the header of the first file.
-
-    None where there is none; also where the file is damaged, which the run reports.
-
-    Raises
-    ------
-    CrsError
-        The coordinate system does not measure lengths.
-    """
-    from ...core.clouds.points import ask
-    from ...core.clouds.readers import first_header
-
-    try:
-        return ask(first_header(source.paths).path, (RAIL_CLASS,), source.crs_wkt).zero.crs_wkt
-    except CloudError:
-        return None
 
 
 def _loaded_layer(name: str, context: QgsProcessingContext) -> QgsMapLayer | None:

@@ -144,7 +144,7 @@ class ReviewDock(QDockWidget):
         if layer is None or sip.isdeleted(layer):
             return
         edits = (layer.attributeValueChanged, layer.geometryChanged, layer.featureAdded, layer.featureDeleted)
-        for signal in (*edits, layer.afterRollBack, layer.afterCommitChanges):
+        for signal in (*edits, layer.afterRollBack, layer.afterCommitChanges, layer.dataSourceChanged):
             if begin:
                 signal.connect(self._note_edit)
             else:

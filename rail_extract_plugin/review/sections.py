@@ -11,9 +11,10 @@ import numpy as np
 from qgis.core import QgsProject, QgsTask, QgsVectorLayer
 
 from ...core.errors import Cancelled, RailExtractError
-from ...core.polyline import interpolate, length_along, resample
+from ...core.jobs.lines import gaps_in
+from ...core.polyline import Polyline
 from ..feedback import TaskProgress
-from ..reading.line_layers import gaps_of
+from ..reading.line_layers import row_of
 from ..writing.layers import vertices_of
 from ..writing.run import RUN, RunCloud, cloud_of
 from .findings import Review
@@ -115,15 +116,15 @@ class Sections:
         if start_m is None or review.value("rail_id") is not None:
             return []
         plane, found = self._planes[review.feature.id()], []
-        stations, along = resample(self._line(review), STEP_M)
+        line = Polyline(self._line(review)).resampled(STEP_M)
         for rail in _rails_of_run(self._run, self._units_m):
             places, _ = _crossings(rail, plane)
             if not len(places):
                 continue
             side = "Right" if places[0, 0] > 0 else "Left"
             for gap in rail.gaps:
-                ends = interpolate(rail.xyz[:, :2], length_along(rail.xyz[:, :2]), gap)
-                first, last = sorted(along[np.argmin(np.hypot(*(stations[:, :2] - end).T))] for end in ends)
+                ends = Polyline(rail.xyz[:, :2]).at(gap)
+                first, last = sorted(line.t[np.argmin(np.hypot(*(line.xy - end).T))] for end in ends)
                 found.append(Gap(side, start_m + first, start_m + last))
         return sorted((gap for gap in found if gap.end_m > gap.start_m), key=lambda gap: gap.start_m)
 
@@ -207,7 +208,7 @@ def _level(rails: np.ndarray, points: np.ndarray | None) -> float:
 
 def _crossings(rail: Rail, plane: CrossSection) -> tuple[np.ndarray, np.ndarray]:
     """Return where a rail crosses a plane within reach, (k, 2), and at which of its plan distances, (k,)."""
-    along = length_along(rail.xyz[:, :2])
+    along = Polyline(rail.xyz).t
     ahead, right, up = plane.seen(rail.xyz).T
     numbers = np.flatnonzero((ahead[:-1] < 0) != (ahead[1:] < 0))
     share = ahead[numbers] / (ahead[numbers] - ahead[numbers + 1])
@@ -227,4 +228,4 @@ def _rails_of_run(run: str | None, units_m: np.ndarray) -> list[Rail]:
     ]
     features = [feature for layer in mine for feature in layer.getFeatures() if feature.hasGeometry()]
     lines = [vertices_of(feature) * units_m for feature in features]
-    return [Rail(line, gaps_of(feature, line)) for feature, line in zip(features, lines)]
+    return [Rail(line, gaps_in(row_of(feature), line)) for feature, line in zip(features, lines)]

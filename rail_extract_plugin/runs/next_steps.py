@@ -16,7 +16,8 @@ from ...core.errors import RailExtractError, UnclassifiedError
 from ...core.standards import STANDARDS
 from ..notices import notices
 from ..setup.dependencies import INSTALL
-from ..writing.bundle import save_all
+from ..writing.bundle import move_to, save_all
+from .preview import name_preview
 
 if TYPE_CHECKING:
     from .run_dialog import RunDialog
@@ -24,10 +25,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Step:
-    """A step that the user may take next: its words, and what it does."""
+    """A step that the user may take next: its words, what it does and, after a failure, why it may help."""
 
     text: str
     take: Callable[[], None]
+    why: str = ""
 
 
 def after_failure(dialog: RunDialog, failure: type | None, standard: str) -> Iterator[Step]:
@@ -41,33 +43,59 @@ def after_failure(dialog: RunDialog, failure: type | None, standard: str) -> Ite
     standard : str
         Name of a rail standard that fits the points better; empty if there is none.
     """
-    if failure is UnclassifiedError and "CLASSIFY" in dialog.mainWidget().wrappers:
-        yield Step("Find the rail points of this raw cloud, and run again", _again(dialog, CLASSIFY=True))
     yield from _with_other_standard(dialog, standard)
+    if failure is UnclassifiedError and "CLASSIFY" in dialog.mainWidget().wrappers:
+        why = "No point of the cloud has a rail class."
+        yield Step("Find the rail points of this raw cloud, and run again", _again(dialog, CLASSIFY=True), why)
 
 
 def after_success(
-    dialog: RunDialog, results: dict[str, Any], context: QgsProcessingContext, standard: str
+    dialog: RunDialog, results: dict[str, Any], context: QgsProcessingContext, standard: str, is_preview: bool = False
 ) -> Iterator[Step]:
-    """Yield what to do with the results of a run; see `after_failure`."""
+    """Yield what to do with the results of a run, or of a preview; see `after_failure`."""
+    yield from _with_other_standard(dialog, standard)
     algorithm = dialog.algorithm()
     if algorithm.name() == INSTALL and algorithm.provider().algorithm("extractrails").canExecute()[0]:
         yield Step("Open the sample…", notices.sample_wanted.emit)
     layers = _layers([one.name() for one in algorithm.destinationParameterDefinitions()], results, context)
+    if is_preview:
+        for layer in list(layers.values())[:1]:
+            name_preview(layer)
+        yield Step("Run on all that is chosen", _again(dialog))
+        return
+    yield from _in_other_dialogs(dialog, layers, results)
     if "FINDINGS" in layers and layers["FINDINGS"].featureCount():
         findings = layers["FINDINGS"].id()
         yield Step("Review the findings", lambda: notices.findings_loaded.emit(findings))
-    if results.get("REPORT"):
-        yield Step("Open the report", lambda: QDesktopServices.openUrl(QUrl.fromLocalFile(results["REPORT"])))
+    report = results.get("REPORT")
+    if report:
+        yield Step("Open the report", lambda: QDesktopServices.openUrl(QUrl.fromLocalFile(report)))
     if layers:
-        yield Step("Save all layers with styles and a project in one GeoPackage…", lambda: _save(dialog, layers))
-    yield from _with_other_standard(dialog, standard)
+        ids = [layer.id() for layer in layers.values()]
+        text = "Save all layers with styles and a project in one GeoPackage…"
+        yield Step(text, lambda: _save(dialog, ids, Path(report) if report else None))
 
 
 def _with_other_standard(dialog: RunDialog, standard: str) -> Iterator[Step]:
     if standard in STANDARDS and "STANDARD" in dialog.mainWidget().wrappers:
         changes = {"STANDARD": standard, "GAUGE": None, "HEAD_WIDTH": None}
-        yield Step(f"Run again as {STANDARDS[standard].label}", _again(dialog, **changes))
+        label = STANDARDS[standard].label
+        yield Step(f"Run again as {label}", _again(dialog, **changes), f"The rails look like {label}.")
+
+
+def _in_other_dialogs(dialog: RunDialog, layers: dict[str, QgsVectorLayer], results: dict[str, Any]) -> Iterator[Step]:
+    """Yield what goes on from the main result of a run: with another algorithm, or with the same one once more."""
+    if "ELEMENTS" in layers and "FIXED" in dialog.mainWidget().wrappers:
+        values = {"INPUT": layers["ELEMENTS"].id()}
+        yield Step("Export the elements for design software…", lambda: dialog.go_on("exportalignment", values))
+    if "PROPOSED" in layers and layers["PROPOSED"].featureCount():
+        yield Step("Run again with the proposed guides", _again(dialog, GUIDE=layers["PROPOSED"].id()))
+    if "RAIL_POINTS" in results and results.get("OUTPUT"):
+        given = dialog.mainWidget().createProcessingParameters()
+        values = {"INPUT": dialog.cloud_layer(results["OUTPUT"]), "RAIL_CLASSES": str(given["RAIL_CLASS"])}
+        values["STANDARD"] = given["STANDARD"]
+        name = Path(results["OUTPUT"]).name
+        yield Step(f"Extract the rails of {name}…", lambda: dialog.go_on("extractrails", values))
 
 
 def _again(dialog: RunDialog, **changes: Any) -> Callable[[], None]:
@@ -82,16 +110,19 @@ def _layers(names: Sequence[str], results: dict[str, Any], context: QgsProcessin
     return {found[layer]: layer for layer in order if layer in found and isinstance(layer, QgsVectorLayer)}
 
 
-def _save(dialog: RunDialog, layers: dict[str, QgsVectorLayer]) -> None:
-    """Ask for a file, and save the layers there."""
+def _save(dialog: RunDialog, ids: Sequence[str], report: Path | None) -> None:
+    """Ask for a file, save the layers there that are still in the project, and have the project use the file."""
     kind = "GeoPackages (*.gpkg)"
     chosen, _ = QFileDialog.getSaveFileName(dialog, "Save all layers of the run", "", kind)
     if not chosen:
         return
     path = Path(chosen).with_suffix(".gpkg")
+    layers = [layer for layer in map(QgsProject.instance().mapLayer, ids) if layer is not None]
     try:
-        save_all(list(layers.values()), path)
+        copied = save_all(layers, path, report)
     except RailExtractError as error:
         dialog.messageBar().pushMessage("", str(error), Qgis.MessageLevel.Critical, 0)
         return
-    dialog.messageBar().pushMessage("", f"Saved {path}.", Qgis.MessageLevel.Success, 0)
+    move_to(layers, path)
+    text = f"Saved {' and '.join(one.name for one in (path, copied) if one)}. The project uses this file from now on."
+    dialog.messageBar().pushMessage("", text, Qgis.MessageLevel.Success, 0)

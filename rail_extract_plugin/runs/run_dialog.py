@@ -6,6 +6,7 @@ QGIS imports this module when it shows a dialog; nothing else may, because there
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 from processing.gui.AlgorithmDialog import AlgorithmDialog
@@ -13,10 +14,12 @@ from processing.gui.ParametersPanel import ParametersPanel
 from qgis.core import (
     Qgis,
     QgsApplication,
+    QgsPointCloudLayer,
     QgsProcessingAlgorithm,
     QgsProcessingContext,
     QgsProcessingFeedback,
     QgsProcessingParameterDefinition,
+    QgsProject,
 )
 from qgis.PyQt import sip
 from qgis.PyQt.QtWidgets import (
@@ -29,15 +32,22 @@ from qgis.PyQt.QtWidgets import (
     QVBoxLayout,
     QWidget,
 )
+from qgis.utils import iface
 
+from ...core.errors import RailExtractError
 from ..dialog.help_panel import ADVANCED
 from ..dialog.sections import OTHERS, RESULTS, SECTIONS, section_of
 from ..dialog.wheel import ignore_wheel
 from ..dialog.wording import with_labels
 from ..links import LinkFollower, links
 from ..notices import notices
+from ..paths import is_sample
+from . import preview
 from .help_pictures import PictureFitter
 from .next_steps import Step, after_failure, after_success
+
+EXTRACT = "extractrails"
+"""Algorithm that a part of the cloud may be tried with."""
 
 
 class RunDialog(AlgorithmDialog):
@@ -55,13 +65,56 @@ class RunDialog(AlgorithmDialog):
         self._follower = LinkFollower(self.findChild(QTextEdit, "txtLog"))
         self._fitter = PictureFitter(self.findChild(QTextBrowser, "textShortHelp"))
         self._failure: type | None = None
+        self._is_preview = False
         self._standard = ""
+        self._part = ""
+        self._try_button: QPushButton | None = None
+        if algorithm.name() == EXTRACT:
+            self._try_button = QPushButton(preview.TEXT)
+            self._try_button.setToolTip(preview.TIP)
+            self._try_button.clicked.connect(lambda: self.try_part())
+            self.buttonBox().addButton(self._try_button, QDialogButtonBox.ButtonRole.ResetRole)
         notices.run_failed.connect(self._note_failure)
         notices.standard_proposed.connect(self._note_standard)
 
     def getParametersPanel(self, alg: QgsProcessingAlgorithm, parent: QWidget) -> ParametersPanel:
         """Return the fields; `AlgorithmDialog` asks for them."""
         return _Panel(parent, alg, self.in_place, self.active_layer)
+
+    def try_part(self) -> None:
+        """Run on the part of the cloud that the map shows."""
+        try:
+            cloud = self.mainWidget().wrappers["INPUT"].parameterValue()
+            self._part = preview.visible_part(cloud, iface.mapCanvas())
+        except RailExtractError as error:
+            self.messageBar().pushMessage("", str(error), Qgis.MessageLevel.Warning, 0)
+            return
+        self.run_again({})
+        self._part = ""  # the run has its values
+
+    def createProcessingParameters(self, *given: Any) -> dict[str, Any]:
+        """Return the values of the fields, limited to the part that is tried; `AlgorithmDialog` asks for them."""
+        values = super().createProcessingParameters(*given)
+        outputs = [one.name() for one in self.algorithm().destinationParameterDefinitions()]
+        return preview.limited(values, outputs, self._part) if self._part else values
+
+    def runAlgorithm(self) -> None:
+        """Begin a run; the lines of an earlier preview go."""
+        preview.drop_previews()
+        self._is_preview = bool(self._part)
+        super().runAlgorithm()
+
+    def blockAdditionalControlsWhileRunning(self) -> None:
+        """Disable what would begin another run."""
+        super().blockAdditionalControlsWhileRunning()
+        if self._try_button is not None:
+            self._try_button.setEnabled(False)
+
+    def resetAdditionalGui(self) -> None:
+        """Enable it again."""
+        super().resetAdditionalGui()
+        if self._try_button is not None:
+            self._try_button.setEnabled(True)
 
     def run_again(self, changes: dict[str, Any]) -> None:
         """Run with other values, as if the user had filled them in."""
@@ -91,12 +144,11 @@ class RunDialog(AlgorithmDialog):
         self.after_run(successful, result, context)
 
     def after_run(self, successful: bool, results: dict[str, Any], context: QgsProcessingContext) -> None:
-        """Keep the standard that was run with, and offer what may follow."""
-        standard = self.mainWidget().wrappers.get("STANDARD")
-        if standard is not None:
-            standard.remember()
+        """Keep the standard that succeeded, unless that was a demonstration, and offer what may follow."""
+        if successful and not self._is_preview:
+            self._remember()
         if successful:
-            steps = list(after_success(self, results, context, self._standard))
+            steps = list(after_success(self, results, context, self._standard, self._is_preview))
         else:
             steps = list(after_failure(self, self._failure, self._standard))
             for step in steps:
@@ -106,11 +158,30 @@ class RunDialog(AlgorithmDialog):
             self.setInfo(f"<b>{'Next:'}</b> {offered}", escapeHtml=False)
         self._failure, self._standard = None, ""
 
+    def go_on(self, name: str, values: dict[str, Any]) -> None:
+        """Open the dialog of another algorithm that goes on with the results of this one."""
+        self._next = open_dialog(name, values, self.parentWidget())
+
+    def cloud_layer(self, path: str) -> str:
+        """Show a cloud that the run has written, if this QGIS can; returns the id of the layer, or else the path."""
+        layer = QgsPointCloudLayer(path, Path(path).stem, "vpc" if path.endswith(".vpc") else "pdal")
+        if not layer.isValid():
+            return path
+        return QgsProject.instance().addMapLayer(layer).id()
+
+    def _remember(self) -> None:
+        """Keep the standard for the next dialog."""
+        wrappers = self.mainWidget().wrappers
+        if "STANDARD" in wrappers and not ("INPUT" in wrappers and _is_of_sample(wrappers["INPUT"].parameterValue())):
+            wrappers["STANDARD"].remember()
+
     def _offer(self, step: Step) -> None:
         """Offer a step in the message bar."""
         button = QPushButton(step.text)
         button.clicked.connect(self._step(step))
-        self.messageBar().pushWidget(button, Qgis.MessageLevel.Warning, 0)
+        item = self.messageBar().createMessage("", step.why)
+        item.layout().addWidget(button)
+        self.messageBar().pushWidget(item, Qgis.MessageLevel.Warning, 0)
 
     def _step(self, step: Step) -> Callable[..., None]:
         """Return a function that takes a step, unless the dialog is gone or at work."""
@@ -162,6 +233,12 @@ class _Panel(ParametersPanel):
             self._layouts[section_of(parameter.name())].addWidget(widget, stretch)
         else:
             super().addParameterWidget(parameter, widget, stretch)
+
+
+def _is_of_sample(value: Any) -> bool:
+    """Return whether the value of an input is the sample: its path, or a layer of it."""
+    layer = QgsProject.instance().mapLayer(value) if isinstance(value, str) else None
+    return is_sample(layer.source() if layer is not None else str(value or ""))
 
 
 def _heading(title: str) -> QLabel:

@@ -127,16 +127,14 @@ def _compare(
     """
     import numpy as np
 
-    from ...core.polyline import interpolate, length_along, project, resample
+    from ...core.polyline import Polyline, project
 
-    places = np.concatenate([resample(line, STEP_M)[0] for line in true_lines])
+    places = np.concatenate([Polyline(line).resampled(STEP_M).xyz for line in true_lines])
     places = places[(places[:, 0] > west) & (places[:, 0] < east)]
     feet = project([line[:, :2] for line in lines], places[:, :2], TOLERANCE_M)
     if not len(feet.point):
         return 0.0, np.inf, np.inf
-    heights = np.concatenate(
-        [interpolate(line, length_along(line[:, :2]), feet.of(i).t)[:, 2] for i, line in enumerate(lines)]
-    )
+    heights = np.concatenate([Polyline(line).at(feet.of(i).t)[:, 2] for i, line in enumerate(lines)])
     above = heights - places[feet.point, 2]
     return len(feet.point) / len(places), float(np.sqrt(np.mean(feet.across**2))), float(np.sqrt(np.mean(above**2)))
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import count
 from pathlib import Path
 
-from qgis.core import QgsMapLayerStyle, QgsProject, QgsVectorFileWriter, QgsVectorLayer
+from qgis.core import QgsDataProvider, QgsMapLayerStyle, QgsProject, QgsVectorFileWriter, QgsVectorLayer
 
 from ...core.disk import Destination
 from ...core.errors import RailExtractError
@@ -14,22 +15,27 @@ PROJECT = "Rail Extract"
 """Name of the project in the file, and of the group of its layers."""
 
 
-def save_all(layers: Sequence[QgsVectorLayer], path: Path) -> None:
+def save_all(layers: Sequence[QgsVectorLayer], path: Path, report: Path | None = None) -> Path | None:
     """Write layers, the topmost first, with styles and aliases of their fields, and a project that shows them.
 
-    An existing file stays until the new one is complete.
+    An existing file stays until the new one is complete. The report of the run is copied to a file beside; its path is
+    returned.
 
     Raises
     ------
     RailExtractError
-        The file cannot be written.
+        The file cannot be written, or a layer is being edited.
     """
+    edited = next((layer.name() for layer in layers if layer.isModified()), None)
+    if edited:
+        raise RailExtractError(f'"{edited}" has edits that are not saved: save or discard them, then save all layers.')
+    tables = _tables(layers)
     with Destination.at(path).replacing() as new:
         project = QgsProject()
         project.setTitle(PROJECT)
         group = project.layerTreeRoot().addGroup(PROJECT)
         for number, layer in enumerate(layers):
-            saved = _saved(layer, _table(layer), new, is_first=number == 0)
+            saved = _saved(layer, tables[layer.id()], new, is_first=number == 0)
             project.addMapLayer(saved, False)
             group.addLayer(saved)
             project.setCrs(saved.crs())
@@ -37,11 +43,31 @@ def save_all(layers: Sequence[QgsVectorLayer], path: Path) -> None:
         project.clear()  # closes the file
         if not written:
             raise RailExtractError(f"The project can't be written to {path.name}: check the free disk space.")
+    if report is None or not report.is_file():
+        return None
+    copied = path.with_name(f"{path.stem} report.html")
+    Destination.at(copied).write_text(report.read_text(encoding="utf-8"))
+    return copied
 
 
-def _table(layer: QgsVectorLayer) -> str:
-    """Return the name of a layer's table: that of its output, without the cloud."""
-    return layer.name().partition(":")[0].strip().lower().replace(" ", "_")
+def move_to(layers: Sequence[QgsVectorLayer], path: Path) -> None:
+    """Have layers of the project read and write their tables in a file that `save_all` has written."""
+    tables = _tables(layers)
+    for layer in layers:
+        crs, source = layer.crs(), f"{path}|layername={tables[layer.id()]}"
+        layer.setDataSource(source, layer.name(), "ogr", QgsDataProvider.ProviderOptions())
+        layer.setCrs(crs)
+        layer.triggerRepaint()
+
+
+def _tables(layers: Sequence[QgsVectorLayer]) -> dict[str, str]:
+    """Return the name of the table of each layer, by its id: that of its output, without the cloud."""
+    tables: dict[str, str] = {}
+    for layer in layers:
+        name = layer.name().partition(":")[0].strip().lower().replace(" ", "_")
+        numbered = (name if number == 1 else f"{name}_{number}" for number in count(1))
+        tables[layer.id()] = next(one for one in numbered if one not in tables.values())
+    return tables
 
 
 def _saved(layer: QgsVectorLayer, table: str, path: Path, is_first: bool) -> QgsVectorLayer:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -26,7 +27,7 @@ from qgis.core import (
 
 from ...core.disk import Destination
 from ...core.errors import RailExtractError
-from ...core.fields import BRIDGED, LENGTH, PLACES, SIGMA, UNKNOWN_IN_METRES, Field, Product
+from ...core.fields import PLACES, UNKNOWN_IN_METRES, Field, Product
 from ...core.progress import SILENT, Progress
 from ..compat import INTEGER, REAL, TEXT, field
 from ..dialog.parameter_values import ParameterValues
@@ -38,12 +39,9 @@ from .whole_files import write_whole
 if TYPE_CHECKING:
     import numpy as np
 
-    from ...core.airborne.survey import AirborneLine
-    from ...core.alignment.fit import Fit
     from ...core.frame import LocalFrame
     from ...core.output.layers import Layer
     from ...core.output.raster_file import RasterHeader
-    from ...core.rails import Centerline, RailLine, TrackGeometry
     from ...core.raster import RailRaster
 
 KINDS = {int: INTEGER, float: REAL, str: TEXT}
@@ -97,11 +95,15 @@ def _shape_of(layer: Layer) -> QgsWkbTypes.Type:
 
 
 def copies(originals: Sequence[QgsFeature], columns: QgsFields, rows: Sequence[Sequence[Any]]) -> Iterator[QgsFeature]:
-    """Copy features with further values, (n, k), for the last fields of `columns`."""
+    """Copy features with further values, (n, k), for the last fields of `columns`; objects become texts."""
     for original, row in zip(originals, rows):
         feature = QgsFeature(columns)
         feature.setGeometry(original.geometry())
-        feature.setAttributes([*original.attributes(), *row[: columns.count() - len(original.attributes())]])
+        own = [
+            json.dumps(value, ensure_ascii=False) if isinstance(value, dict) else value
+            for value in original.attributes()
+        ]
+        feature.setAttributes([*own, *row[: columns.count() - len(own)]])
         yield feature
 
 
@@ -116,7 +118,8 @@ def add_features(sink: QgsFeatureSink, made: Iterator[QgsFeature]) -> int:
     count = 0
     for feature in made:
         if not sink.addFeature(feature, QgsFeatureSink.Flag.FastInsert):
-            raise RailExtractError(f"The output can't be written ({sink.lastError()}): check the free disk space.")
+            reason = " ".join(sink.lastError().split())
+            raise RailExtractError(f"The output can't be written ({reason}): check the free disk space.")
         count += 1
     return count
 
@@ -201,29 +204,6 @@ def write_raster(
         write_rasters(new, header, rasters, progress)
     _style(values, name, path, "raster")
     return {name: path}
-
-
-def figures_of(lines: Sequence[RailLine | Centerline] | Sequence[AirborneLine], what: str) -> dict[str, Any]:
-    """Return the number and length of lines as outputs: RAIL_COUNT and RAIL_LENGTH if `what` is RAIL."""
-    return {f"{what}_COUNT": len(lines), f"{what}_LENGTH": LENGTH.value(sum(line.length_m for line in lines))}
-
-
-def figures_of_stations(tracks: Sequence[TrackGeometry]) -> dict[str, Any]:
-    """Return the number of stations, the standard error and the length without points, as outputs."""
-    sigma = [value for track in tracks for value in track.sigma_mm if math.isfinite(value)]
-    return {
-        "STATION_COUNT": sum(len(track.chainage_m) for track in tracks),
-        "SIGMA": SIGMA.value(math.sqrt(sum(value**2 for value in sigma) / len(sigma))) if sigma else None,
-        "BRIDGED_LENGTH": BRIDGED.value(sum(track.bridged_m for track in tracks)),
-    }
-
-
-def figures_of_fits(fits: Sequence[Fit]) -> dict[str, Any]:
-    """Return the number of elements, and the root mean square of the slews in millimetres, as outputs."""
-    squares = sum(float((fit.deviations.slew_mm**2).sum()) for fit in fits)
-    count = sum(len(fit.deviations.s) for fit in fits)
-    elements = sum(len(fit.alignment.elements) for fit in fits)
-    return {"ELEMENT_COUNT": elements, "RMS": round(math.sqrt(squares / count), 3)}
 
 
 def output_crs(wkt: str | None) -> QgsCoordinateReferenceSystem:

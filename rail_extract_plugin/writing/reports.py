@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,10 +12,12 @@ from ..dialog.parameter_values import ParameterValues
 from ..notices import notices
 
 if TYPE_CHECKING:
-    from ...core.alignment.deviations import Deviations
-    from ...core.alignment.elements import Alignment
     from ...core.rails import RailNetwork
     from ...core.report import Origin
+
+
+REPORT = "REPORT"
+"""Name of the page that a run shows."""
 
 
 def write_report(values: ParameterValues, network: RailNetwork, origin: Origin) -> dict[str, str]:
@@ -23,14 +25,16 @@ def write_report(values: ParameterValues, network: RailNetwork, origin: Origin) 
     return write_shown(values, lambda: origin.report(network))
 
 
-def write_shown(values: ParameterValues, build: Callable[[], str]) -> dict[str, str]:
-    """Write REPORT if the user wants it, and have QGIS show it; an existing file stays until it is complete.
+def write_shown(values: ParameterValues, build: Callable[[], str], name: str = REPORT) -> dict[str, str]:
+    """Write a page if the user wants it, and have QGIS show a report; an existing file stays until it is complete.
 
     Parameters
     ----------
     values : ParameterValues
     build : callable
         Returns the page.
+    name : str
+        Of the output.
 
     Returns
     -------
@@ -42,40 +46,13 @@ def write_shown(values: ParameterValues, build: Callable[[], str]) -> dict[str, 
     RailExtractError
         The file cannot be written.
     """
-    path = values.output_file("REPORT")
+    path = values.output_file(name)
     if not path:
         return {}
-    written = write_page(values, "REPORT", path, build())
-    notices.report_written.emit(path)
+    written = write_page(values, name, path, build())
+    if name == REPORT:
+        notices.report_written.emit(path)
     return written
-
-
-def write_alignment_report(
-    values: ParameterValues,
-    courses: Sequence[tuple[Alignment, Deviations]],
-    source: str,
-    facts: Mapping[str, str],
-    fitted: bool,
-) -> dict[str, str]:
-    """Write the report on alignments; see `write_shown`.
-
-    Parameters
-    ----------
-    values : ParameterValues
-    courses : sequence of (Alignment, Deviations)
-    source : str
-        Name of the measured tracks.
-    facts : mapping of str to str
-        Facts to state by name, besides date, version and coordinate system.
-    fitted : bool
-        Whether the alignments were fitted to the tracks.
-    """
-    from ...core.report import build_alignment_page
-
-    def build() -> str:
-        return build_alignment_page(courses, source, facts, fitted)
-
-    return write_shown(values, build)
 
 
 def write_check(values: ParameterValues, verdict: str, facts: Mapping[str, str]) -> dict[str, str]:

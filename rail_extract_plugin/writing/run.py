@@ -6,19 +6,32 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 from uuid import uuid4
 
-from qgis.core import QgsMapLayer, QgsProject
+from qgis.core import (
+    QgsMapLayer,
+    QgsProcessingContext,
+    QgsProcessingFeatureSourceDefinition,
+    QgsProcessingUtils,
+    QgsProject,
+    QgsProperty,
+)
 
-from ..reading.clouds import CloudSource
+from ...core.jobs.clouds import CloudSource
 
 if TYPE_CHECKING:
     from ...core.frame import LocalFrame
 
 RUN, CLOUD, NUMBER = "rail_extract/run", "rail_extract/cloud", "rail_extract/number"
 """Names of the properties: the id that the layers of a run share, the cloud with its rail classes, and the number of
-the run among those of the same cloud in the project."""
+the run among those of the same algorithm and input in the project."""
+
+TOOL, SOURCE, LAYER = "rail_extract/tool", "rail_extract/source", "rail_extract/input"
+"""Names of further ones: the label of the algorithm, what it was run on, in words, and the id of that layer, if any."""
+
+TABLE = "|layername="
+"""What comes before the name of a table in the source of a layer."""
 
 
 @dataclass(frozen=True)
@@ -49,19 +62,47 @@ class RunCloud:
         return f"{first} and {len(self.paths) - 1} more" if len(self.paths) > 1 else first
 
 
-def new_run() -> dict[str, str]:
-    """Return the property that the layers of a new run share."""
-    return {RUN: str(uuid4())}
+def new_run(tool: str, value: Any, context: QgsProcessingContext) -> dict[str, str]:
+    """Return the properties that the layers of a new run share.
+
+    Parameters
+    ----------
+    tool : str
+        Label of the algorithm.
+    value : object
+        Value of its main input, which gives the layers their names: that of the layer, or of the file.
+    context : QgsProcessingContext
+    """
+    value = value.source if isinstance(value, QgsProcessingFeatureSourceDefinition) else value
+    value = value.valueAsString(context.expressionContext())[0] if isinstance(value, QgsProperty) else value
+    layer = (
+        value if isinstance(value, QgsMapLayer) else QgsProcessingUtils.mapLayerFromString(str(value), context, False)
+    )
+    return {RUN: str(uuid4()), TOOL: tool, **(_of_layer(layer) if layer else _of_file(str(value or "")))}
+
+
+def _of_layer(layer: QgsMapLayer) -> dict[str, str]:
+    """Return what states an input that is a layer; nothing for one between two steps of a model."""
+    if QgsProject.instance().mapLayer(layer.id()) is None:
+        return {}
+    return {SOURCE: layer.customProperty(SOURCE) or layer.name(), LAYER: layer.id()}
+
+
+def _of_file(source: str) -> dict[str, str]:
+    """Return what states an input that is a file or a table of one; nothing for one between two steps of a model."""
+    file, _, table = source.partition(TABLE)
+    is_between = Path(QgsProcessingUtils.tempFolder()) in Path(file).parents
+    return {} if is_between else {SOURCE: table or Path(file).name.partition(".")[0]}
 
 
 def properties_of(
     cloud: CloudSource, class_codes: Sequence[int], head_width_m: float, frame: LocalFrame
 ) -> dict[str, str]:
-    """Return the properties of the layers of a new run."""
+    """Return the property that states the cloud of a run."""
     paths = [str(path.resolve()) for path in cloud.paths]
     facts = {"paths": paths, "classes": list(class_codes), "crs": cloud.crs_wkt, "head_width_m": head_width_m}
     facts["units_m"] = [frame.horizontal_unit_m, frame.horizontal_unit_m, frame.vertical_unit_m]
-    return {**new_run(), CLOUD: json.dumps(facts)}
+    return {CLOUD: json.dumps(facts)}
 
 
 def cloud_of(layer: QgsMapLayer) -> RunCloud | None:
@@ -76,29 +117,28 @@ def cloud_of(layer: QgsMapLayer) -> RunCloud | None:
         return None
 
 
-def run_name(layer: QgsMapLayer, title: str) -> str:
-    """Return a layer's title with the name of its cloud, and a number from the second run on; the title without a run.
+def name_run(layer: QgsMapLayer, title: str) -> str:
+    """Return the name of the run that made a layer, that of its algorithm and input; empty if the layer states none.
 
-    Parameters
-    ----------
-    layer : QgsMapLayer
-        Gets the number as a property.
-    title : str
+    Runs of the same algorithm and input are numbered from the second on. A layer that is called by its title gets the
+    name of the input as well; others, such as those of files, are called as the user wants.
     """
-    cloud = cloud_of(layer)
-    if cloud is None:
-        return title
-    number = _number_of_run(layer, cloud)
+    source = layer.customProperty(SOURCE)
+    if not source:
+        return ""
+    number = _number_of_run(layer)
     layer.setCustomProperty(NUMBER, number)
-    return f"{title}: {cloud.name}" if number == 1 else f"{title}: {cloud.name} {number}"
+    numbered = source if number == 1 else f"{source} {number}"
+    if layer.name() == title:
+        layer.setName(f"{title}: {numbered}")
+    return f"{layer.customProperty(TOOL)}: {numbered}"
 
 
-def _number_of_run(layer: QgsMapLayer, cloud: RunCloud) -> int:
+def _number_of_run(layer: QgsMapLayer) -> int:
     """Return the number that the run has already, or the next free one."""
     others = [one for one in QgsProject.instance().mapLayers().values() if one.id() != layer.id()]
-    numbered = [(one, int(one.customProperty(NUMBER))) for one in others if one.customProperty(NUMBER)]
-    run = layer.customProperty(RUN)
-    own = [number for one, number in numbered if one.customProperty(RUN) == run]
-    known = (cloud_of(one) for one, _ in numbered)
-    taken = [number for (_, number), other in zip(numbered, known) if other is not None and other.name == cloud.name]
-    return own[0] if own else max(taken, default=0) + 1
+    alike = [
+        one for one in others if all(one.customProperty(key) == layer.customProperty(key) for key in (TOOL, SOURCE))
+    ]
+    numbers = {one.customProperty(RUN): int(one.customProperty(NUMBER)) for one in alike if one.customProperty(NUMBER)}
+    return numbers.get(layer.customProperty(RUN)) or max(numbers.values(), default=0) + 1

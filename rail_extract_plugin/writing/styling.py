@@ -7,7 +7,9 @@ from collections.abc import Mapping
 from qgis.core import (
     QgsCoordinateReferenceSystem,
     QgsLayerTree,
+    QgsLayerTreeGroup,
     QgsMapLayer,
+    QgsMapLayerStyle,
     QgsProcessingContext,
     QgsProcessingFeedback,
     QgsProcessingLayerPostProcessorInterface,
@@ -15,10 +17,10 @@ from qgis.core import (
 )
 from qgis.PyQt import sip
 
-from .. import compat
+from ...core.fields import PLACES
 from ..notices import notices
 from ..paths import STYLES
-from .run import RUN, run_name
+from .run import LAYER, RUN, name_run
 from .view_3d import show_lines_in_3d
 
 FINDINGS = "findings"
@@ -30,7 +32,7 @@ STYLE = "rail_extract/style"
 NO_PROPERTIES: Mapping[str, str] = {}
 
 TOP_TO_BOTTOM = (
-    *("stops", "findings", "differences", "deviations", "elements", "axes", "centerlines", "airborne", "rails"),
+    *("stops", "findings", "differences", "elements", "deviations", "axes", "centerlines", "airborne", "rails"),
     *("proposed", "stations", "quality", "places", "raster"),
 )
 """Order of the layers of a run, by style: what is to be looked at first, then the lines, and what they rest on."""
@@ -50,40 +52,65 @@ class _Styler(QgsProcessingLayerPostProcessorInterface):
             # QGIS marks such a layer and asks for its system; it can't place the one that stands for an unknown one.
             layer.setCrs(QgsCoordinateReferenceSystem())
         layer.loadNamedStyle(str(STYLES / f"{self._style}.qml"))
+        if self._style == PLACES.style:
+            _look_like(layer, QgsProject.instance().mapLayer(self._properties.get(LAYER, "")))
         layer.setCustomProperty(STYLE, self._style)
         show_lines_in_3d(layer, self._style)
         for name, value in self._properties.items():
             layer.setCustomProperty(name, value)
-        if layer.name() == self._title:
-            layer.setName(run_name(layer, self._title))
-        _put_in_order(layer)
+        run = name_run(layer, self._title)
+        if run:
+            _put_into_group(layer, run)
         layer.triggerRepaint()
         if self._style == FINDINGS:
             notices.findings_loaded.emit(layer.id())
 
 
-def _put_in_order(layer: QgsMapLayer) -> None:
-    """Sort the layers of a run that are next to the one that has just been loaded.
+def _look_like(copy: QgsMapLayer, original: QgsMapLayer | None) -> None:
+    """Give a copy with further fields style and properties of its original, and keep the names in words it has."""
+    if original is None:
+        return
+    names = [copy.attributeAlias(number) for number in range(copy.fields().count())]
+    style = QgsMapLayerStyle()
+    style.readFromLayer(original)
+    style.writeToLayer(copy)
+    for number, name in enumerate(names):
+        if name:
+            copy.setFieldAlias(number, name)
 
-    QGIS sorts new layers only, and puts them above one of an earlier run whose file is written again.
-    """
+
+def _put_into_group(layer: QgsMapLayer, run: str) -> None:
+    """Move a layer into the group of its run, at its place there; a new group is where the layer was."""
     node = QgsProject.instance().layerTreeRoot().findLayer(layer.id())
     if node is None:
         return
-    group = node.parent()
-    loaded = [one for one in group.children() if QgsLayerTree.isLayer(one) and one.layer() is not None]
-    mine = [one for one in loaded if one.layer().customProperty(RUN) == layer.customProperty(RUN)]
-    styles = [one.layer().customProperty(STYLE) for one in mine]
-    if not all(style in TOP_TO_BOTTOM for style in styles):
-        return
-    places = list(map(TOP_TO_BOTTOM.index, styles))
-    if places == sorted(places):
-        return
-    top = group.children().index(mine[0])
-    for number in sorted(range(len(mine)), key=places.__getitem__, reverse=True):
-        group.insertChildNode(top, mine[number].clone())
-    for one in mine:
-        group.removeChildNode(one)
+    before = node.parent()
+    outside = before.parent() if before.customProperty(RUN) else before
+    mine = layer.customProperty(RUN)
+    groups = [one for one in outside.children() if QgsLayerTree.isGroup(one)]
+    group = next((one for one in groups if one.customProperty(RUN) == mine), None)
+    if group is None:
+        neighbour = node if outside is before else before
+        group = outside.insertGroup(outside.children().index(neighbour), run)
+        group.setCustomProperty(RUN, mine)
+    group.insertChildNode(_place_in(group, layer), node.clone())
+    before.removeChildNode(node)  # last, because QGIS removes layers that are in no group
+    if outside is not before and not before.children():
+        outside.removeChildNode(before)
+
+
+def _place_in(group: QgsLayerTreeGroup, layer: QgsMapLayer) -> int:
+    """Return the place of a layer among those of a group, by their styles."""
+    ranks = {style: number for number, style in enumerate(TOP_TO_BOTTOM)}
+    children = group.children()
+    loaded = [one.layer() if QgsLayerTree.isLayer(one) else None for one in children]
+    below = (
+        number
+        for number, one in enumerate(loaded)
+        if one is not None and one != layer
+        if ranks.get(one.customProperty(STYLE), 0) > ranks.get(layer.customProperty(STYLE), 0)
+    )
+    return next(below, len(children))
 
 
 _kept: list[_Styler] = []
@@ -107,7 +134,7 @@ def style_on_load(
 ) -> None:
     """Apply a style if QGIS loads the layer after the run.
 
-    The layers of a run are in the order of `TOP_TO_BOTTOM`, and in one group if QGIS supports groups for results.
+    The layers of a run are in one group, in the order of `TOP_TO_BOTTOM`.
 
     Parameters
     ----------
@@ -118,12 +145,10 @@ def style_on_load(
     properties : mapping of str to str
         To be stored with the layer.
     title : str
-        Name of the output. A layer with this name gets that of the cloud as well; a model, for example, gives its own.
+        Name of the output. A layer with this name gets that of the input as well; a model, for example, gives its own.
     has_system : bool
         Whether the coordinate system of the layer is known.
     """
     if context.willLoadLayerOnCompletion(layer_id):
         details = context.layerToLoadOnCompletionDetails(layer_id)
         details.setPostProcessor(_styler(style, title, properties, has_system))
-        if compat.GROUPS_LAYERS:
-            details.groupName = "Rail Extract"

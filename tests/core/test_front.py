@@ -106,11 +106,11 @@ def test_raw_points_are_classified_into_a_copy_from_which_rails_come(tmp_path):
     cloud = laspy.LasData(header)
     cloud.x, cloud.y, cloud.z = scene.xyz.T
     cloud.write(tmp_path / "raw.laz")
-    figures = rx.classify(tmp_path / "raw.laz", tmp_path / "new.laz", standard="EN_49E1_1000")
-    assert figures.paired_m == pytest.approx(100, abs=6)
+    figures = rx.classify(tmp_path / "raw.laz", tmp_path / "new.laz", standard="EN_49E1_1000", workers=1).figures
+    assert figures["PAIRED_LENGTH"] == pytest.approx(100, abs=6)
     labelled = laspy.read(tmp_path / "new.laz").classification
-    assert np.count_nonzero(np.asarray(labelled) == 10) == figures.points
+    assert np.count_nonzero(np.asarray(labelled) == 10) == figures["RAIL_POINTS"]
     found = rx.extract(tmp_path / "new.laz", standard="EN_49E1_1000", passes=1, engine="OPENCV")
     direct = rx.extract(tmp_path / "raw.laz", standard="EN_49E1_1000", raw=True, passes=1, engine="OPENCV")
     assert len(found.rails) == len(direct.rails) == 2
-    assert direct.search.points == figures.points
+    assert direct.search.points == figures["RAIL_POINTS"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import partial
 from pathlib import Path
 
@@ -13,11 +13,14 @@ from driver import Driver, algorithm, choose, close, install, later, open_batch,
 from qgis.core import (
     QgsApplication,
     QgsCoordinateReferenceSystem,
+    QgsLayerTree,
     QgsPointCloudLayer,
     QgsPointXY,
+    QgsProcessingFeatureSourceDefinition,
     QgsProcessingParameterEnum,
     QgsProject,
     QgsRectangle,
+    QgsSettings,
     QgsVectorFileWriter,
     QgsVectorLayer,
 )
@@ -27,6 +30,7 @@ from qgis.PyQt.QtGui import QDesktopServices, QTextCursor, QTextDocument, QWheel
 from qgis.PyQt.QtTest import QTest
 from qgis.PyQt.QtWidgets import (
     QAbstractSpinBox,
+    QAction,
     QApplication,
     QComboBox,
     QDialogButtonBox,
@@ -233,9 +237,10 @@ def welcome(driver: Driver) -> Iterator:
     bar = iface.messageBar()
     driver.keep("at first", _message(bar))
     driver.picture("welcome")
-    kind, notices = type(algorithm("extractrails")), sys.modules["rail_extract.rail_extract_plugin.notices"].notices
+    job, notices = type(algorithm("extractrails")).JOB, sys.modules["rail_extract.rail_extract_plugin.notices"].notices
     packages = sys.modules["rail_extract.rail_extract_plugin.setup.dependencies"]
-    needs, kind.NEEDS = kind.NEEDS, (*kind.NEEDS, ("torch_of_nobody",))
+    needs = job.needs
+    object.__setattr__(job, "needs", (*needs, ("torch_of_nobody",)))
     packages.PACKAGES += (packages.Package("torch_of_nobody", "torch"),)
     notices.packages_installed.emit()
     yield 0.5
@@ -244,7 +249,8 @@ def welcome(driver: Driver) -> Iterator:
     later(_button_of(bar).click)
     dialog = yield lambda: window("AlgorithmDialog")
     driver.keep("first button opens", dialog.algorithm().name())
-    kind.NEEDS, packages.PACKAGES = needs, packages.PACKAGES[:-1]
+    object.__setattr__(job, "needs", needs)
+    packages.PACKAGES = packages.PACKAGES[:-1]
     driver.keep("log of the installation", (yield from press_run(dialog)))
     driver.picture("welcome_installed")
     yield from close(dialog)
@@ -310,6 +316,7 @@ def raw(driver: Driver) -> Iterator:
     driver.picture("raw_refused")
     (offer,) = (one for one in dialog.messageBar().findChildren(QPushButton) if "raw cloud" in one.text())
     driver.keep("offer", offer.text())
+    driver.keep("why", dialog.messageBar().currentItem().text())
     offer.click()
     button = dialog.buttonBox().button(QDialogButtonBox.StandardButton.Ok)
     yield lambda: not button.isEnabled()
@@ -326,13 +333,8 @@ def raw(driver: Driver) -> Iterator:
 
 def _save_all(driver: Driver, log: QTextEdit) -> Iterator:
     """Follow the link that saves all layers, and open the project that is in the file."""
-    _follow(log, "Save all layers")
-    chooser = yield lambda: window("QFileDialog")
-    path = str(driver.folder / "all of it.gpkg")
-    chooser.findChild(QLineEdit, "fileNameEdit").setText(path)
-    later(chooser.findChild(QDialogButtonBox).button(QDialogButtonBox.StandardButton.Save).click)
-    yield lambda: Path(path).exists()
-    yield 1.0
+    path = driver.folder / "all of it.gpkg"
+    yield from _save(log, path)
     driver.picture("saved")
     QgsProject.instance().clear()
     driver.keep("project is read", QgsProject.instance().read(f"geopackage:{path}?projectName=Rail Extract"))
@@ -348,8 +350,7 @@ def _save_all(driver: Driver, log: QTextEdit) -> Iterator:
 def missing(driver: Driver) -> Iterator:
     """Open an algorithm whose packages are missing, and follow the link of its message."""
     yield from install(ARCHIVE)
-    kind = type(algorithm("trainrailclassifier"))
-    kind.NEEDS = (("torch_of_nobody",),)
+    object.__setattr__(type(algorithm("trainrailclassifier")).JOB, "needs", (("torch_of_nobody",),))
     packages = sys.modules["rail_extract.rail_extract_plugin.setup.dependencies"]
     packages.PACKAGES = (packages.Package("torch_of_nobody", "torch"),)
     packages.OPTIONAL = sys.modules["rail_extract.rail_extract_plugin.runs.missing"].OPTIONAL = ("torch_of_nobody",)
@@ -417,6 +418,116 @@ def again(driver: Driver) -> Iterator:
     driver.picture("right_review")
     yield from _save_all(driver, log)
     yield from close(dialog)
+
+
+def onwards(driver: Driver) -> Iterator:
+    """Run the sample, save the run, decide, open another dialog, and go on with the lines: fit, export, stations."""
+    yield from install(ARCHIVE)
+    _menu("Open the Sample…").trigger()
+    dialog = yield lambda: window("AlgorithmDialog")
+    dialog.setParameters({"QUALITY": "TEMPORARY_OUTPUT"})
+    yield from press_run(dialog)
+    driver.picture("onwards_sample")
+    yield from _save(dialog.findChild(QTextEdit, "txtLog"), driver.folder / "run.gpkg")
+    driver.picture("onwards_saved")
+    driver.keep("saved", [dialog.messageBar().currentItem().text(), *sorted(_names(driver.folder.glob("run*")))])
+    yield from close(dialog)
+    dialog = yield from open_dialog("extractrails")
+    driver.keep("standard of the next dialog", dialog.mainWidget().wrappers["STANDARD"].value())
+    yield from close(dialog)
+    layers = {one.name().partition(":")[0]: one for one in QgsProject.instance().mapLayers().values()}
+    driver.keep("sources", sorted({Path(one.source().partition("|")[0]).name for one in layers.values()}))
+    iface.mainWindow().findChild(QDockWidget, "RailExtractReview").buttons["rejected"].click()
+    saved = QgsVectorLayer(f"{driver.folder / 'run.gpkg'}|layername=findings", "", "ogr")
+    driver.keep("decided", [feature["review"] for feature in saved.getFeatures()][:2])
+    tracks, quality = layers["Track centerlines"], layers["Track geometry"]
+    dialog = yield from open_dialog("fitalignment")
+    dialog.setParameters({"INPUT": tracks.id(), "QUALITY": quality.id()})
+    driver.keep("fit", (yield from press_run(dialog)).splitlines()[-1])
+    driver.picture("onwards_fit")
+    _follow(dialog.findChild(QTextEdit, "txtLog"), "Export the elements")
+    export = yield lambda: next((one for one in _dialogs() if one.algorithm().name() == "exportalignment"), None)
+    elements = QgsProject.instance().mapLayer(export.mainWidget().wrappers["INPUT"].parameterValue())
+    driver.keep("exported", elements.name())
+    driver.picture("onwards_export")
+    yield from close(export)
+    yield from close(dialog)
+    dialog = yield from open_dialog("stationalongaxis")
+    tracks.selectByIds([next(tracks.getFeatures()).id()])
+    axis = QgsProcessingFeatureSourceDefinition(tracks.id(), True)
+    dialog.setParameters({"INPUT": layers["Findings"].id(), "AXIS": axis, "START_KM": 10.0})
+    yield from press_run(dialog)
+    yield from close(dialog)
+    stationed = next(one for one in QgsProject.instance().mapLayers().values() if "with kilometres" in one.name())
+    driver.keep("aliases", [stationed.attributeAlias(stationed.fields().lookupField(one)) for one in ("doubt_m", "km")])
+    driver.keep("colours", [one.symbol().color().name() for one in stationed.renderer().categories()])
+    driver.keep("groups", _groups())
+    driver.picture("onwards_stations")
+
+
+def tried(driver: Driver) -> Iterator:
+    """Try a part of the sample without a map, another one that the map shows, and then run on all of it."""
+    yield from install(ARCHIVE)
+    dialog = yield from open_dialog("extractrails")
+    rails = str(driver.folder / "rails.gpkg")
+    dialog.setParameters(
+        {"INPUT": SAMPLE, "RAILS": rails, "STANDARD": PART["STANDARD"], "ITERATIONS": 1, "REPORT": None}
+    )
+    button = next(one for one in dialog.buttonBox().buttons() if "visible" in one.text())
+    for name in ("without a map", "in the map"):
+        later(button.click)
+        yield lambda: not button.isEnabled()
+        yield button.isEnabled
+        yield 1.0
+        driver.picture(f"tried {name}")
+        driver.keep(name, _groups())
+        (layer,) = [one for one in QgsProject.instance().mapLayers().values() if one.name().startswith("Rails")]
+        driver.keep(f"extent {name}", layer.extent().toRectF().getCoords())
+        iface.mapCanvas().setExtent(QgsRectangle.fromCenterAndSize(layer.extent().center(), 20, 20))
+        iface.mapCanvas().refresh()
+        yield 1.0
+    log = dialog.findChild(QTextEdit, "txtLog")
+    driver.keep("offered", log.toPlainText().splitlines()[-1])
+    driver.keep("file", Path(rails).exists())
+    driver.keep("standard that is remembered", QgsSettings().value("rail_extract/standard"))
+    dialog.setParameters({"EXTENT": PART["EXTENT"]})
+    _follow(log, "Run on all")
+    yield lambda: not button.isEnabled()
+    yield button.isEnabled
+    yield 1.0
+    driver.keep("at last", _groups())
+    yield from close(dialog)
+
+
+def _menu(text: str) -> QAction:
+    """Return an entry of the plugin's menu."""
+    menu = next(one for one in iface.pluginMenu().actions() if one.text() == "Rail Extract").menu()
+    return next(one for one in menu.actions() if one.text() == text)
+
+
+def _dialogs() -> list[QWidget]:
+    """Return the visible dialogs of algorithms."""
+    return [one for one in QApplication.topLevelWidgets() if one.isVisible() and hasattr(one, "algorithm")]
+
+
+def _names(paths: Iterable[Path]) -> list[str]:
+    return [path.name for path in paths]
+
+
+def _groups() -> dict[str, list[str]]:
+    """Return the groups of the project, the topmost first, with their layers."""
+    groups = [one for one in QgsProject.instance().layerTreeRoot().children() if QgsLayerTree.isGroup(one)]
+    return {one.name(): [node.name() for node in one.findLayers()] for one in groups}
+
+
+def _save(log: QTextEdit, path: Path) -> Iterator:
+    """Follow the link that saves all layers."""
+    _follow(log, "Save all layers")
+    chooser = yield lambda: window("QFileDialog")
+    chooser.findChild(QLineEdit, "fileNameEdit").setText(str(path))
+    later(chooser.findChild(QDialogButtonBox).button(QDialogButtonBox.StandardButton.Save).click)
+    yield path.exists
+    yield 1.0
 
 
 def _follow(log: QTextEdit, text: str) -> None:
@@ -603,7 +714,12 @@ def growing(driver: Driver) -> Iterator:
     yield from _answer(chooser, RAW)
     yield lambda: tool.message and not tool.is_growing
     driver.keep("said beside", tool.message)
+    driver.keep("cloud in the toolbar", tool.clouds.combo.currentText())
     driver.picture("grow_missed")
+    tool.clouds.set_value(SAMPLE)
+    driver.keep("said of the sample", tool.message)
+    yield 0.5
+    driver.picture("grow_sample")
     layer = QgsPointCloudLayer(RAW, "raw", "pdal")  # invalid in a QGIS without PDAL
     layer.setCrs(system)
     iface.setActiveLayer(QgsProject.instance().addMapLayer(layer))
@@ -629,8 +745,13 @@ def growing(driver: Driver) -> Iterator:
     dialog.setParameters({**values, "INPUT": RAW, "RAIL_CLASS": 20, "OUTPUT": classified})
     driver.keep("log", (yield from press_run(dialog)))
     driver.keep("results", dialog.results())
-    yield from close(dialog)
     driver.picture("grown_classified")
+    _follow(dialog.findChild(QTextEdit, "txtLog"), "Extract the rails of classified.las")
+    onwards = yield lambda: next((one for one in _dialogs() if one.algorithm().name() == "extractrails"), None)
+    values = onwards.mainWidget().createProcessingParameters()
+    driver.keep("extract", [values["INPUT"], values["RAIL_CLASSES"], values["STANDARD"]])
+    yield from close(onwards)
+    yield from close(dialog)
 
 
 def _click(place: QgsPointXY) -> Iterator:
@@ -663,7 +784,13 @@ def batch(driver: Driver) -> Iterator:
     driver.picture("batch_ran")
     driver.keep("files", sorted(path.name for path in driver.folder.glob("R*")))
     driver.keep("layers", [layer.name() for layer in QgsProject.instance().mapLayers().values()])
+    for row in range(2):
+        column = panel.parameter_to_column["RAIL_CLASSES"]
+        panel.wrappers[row][column].setParameterValue("99", panel.processing_context)
+    driver.keep("failed log", (yield from press_run(dialog)))
     yield from close(dialog)
+    yield 1.0
+    driver.keep("tasks left", [task.description() for task in QgsApplication.taskManager().activeTasks()])
 
 
 def model(driver: Driver) -> Iterator:

@@ -9,7 +9,7 @@ from osgeo import gdal, ogr
 
 SCENARIOS = (
     *("dialogs", "wheel", "unload", "raw", "missing", "rails", "welcome"),
-    *("review", "reopened", "again", "growing", "batch", "model"),
+    *("review", "reopened", "again", "tried", "onwards", "growing", "batch", "model"),
 )
 
 DIES_AT_EXIT = ("rails", 340)
@@ -102,6 +102,7 @@ def test_a_raw_cloud_without_the_tick_is_explained_and_its_rails_are_found(run_s
     refusal = session["refusal"]
     assert "The cloud has no points of class 10" in refusal
     assert 'if nobody has classified the cloud, "Find the rail points of a raw cloud"' in refusal
+    assert session["why"] == "No point of the cloud has a rail class."
     assert session["offer"] == "Find the rail points of this raw cloud, and run again"
     assert f"Next: {session['offer']}" in refusal
     found = session["log"].rpartition("starting")[2]
@@ -148,7 +149,7 @@ def test_an_empty_dock_is_closed_at_the_start_and_no_message_comes_twice(run_sce
 def test_a_wrong_gauge_is_corrected_by_a_link(run_scenario):
     session = run_scenario("again")
     steps = ["Review the findings", "Open the report", "Save all layers with styles and a project in one GeoPackage…"]
-    assert session["wrong"].rstrip().endswith("  ·  ".join([*steps, "Run again as India 75R, 1000 mm"]))
+    assert session["wrong"].rstrip().endswith("Next: " + "  ·  ".join(["Run again as India 75R, 1000 mm", *steps]))
     assert session["wrong"].count("is it India 75R, 1000 mm") == 1
     assert session["standard"] == "IN_75R_1000"
     assert session["results"]["CENTERLINE_COUNT"] == 3
@@ -274,6 +275,13 @@ def test_a_clicked_rail_grows_and_is_classified(run_scenario):
     assert session["results"]["PAIRED_LENGTH"] > 20
     assert "Followed 1" in session["log"]
     assert (session.folder / "classified.las").stat().st_size > 100_000
+    assert session["extract"] == [str(session.folder / "classified.las"), "20", "EN_60E1_1435"]
+
+
+def test_the_toolbar_says_in_which_cloud_rails_grow_and_where_they_need_not(run_scenario):
+    session = run_scenario("growing")
+    assert Path(session["cloud in the toolbar"]).name == "raw.las"
+    assert session["said of the sample"].startswith("This cloud has points of class 10")
 
 
 def test_batch_writes_what_is_named_and_skips_what_is_blank(run_scenario):
@@ -282,6 +290,61 @@ def test_batch_writes_what_is_named_and_skips_what_is_blank(run_scenario):
     assert "Batch execution completed" in session["log"]
     assert session["files"] == ["RAILS0.gpkg", "RAILS1.gpkg", "REPORT0.html", "REPORT1.html"]
     assert session["layers"] == ["RAILS0", "RAILS1"]
+
+
+def test_a_part_is_tried_and_nothing_of_it_is_kept(run_scenario):
+    session = run_scenario("tried")
+    preview = {"Preview of Extract rails: sample": ["Track centerlines: sample", "Rails: sample"]}
+    assert session["without a map"] == session["in the map"] == preview
+    west, south, east, north = session["extent without a map"]
+    assert 40 < max(east - west, north - south) <= 101
+    west, south, east, north = session["extent in the map"]
+    assert 10 < max(east - west, north - south) < 60
+    assert session["offered"] == "Next: Run on all that is chosen"
+    assert (session["file"], session["standard that is remembered"]) == (False, None)
+    (run,) = session["at last"]
+    assert run == "Extract rails: sample"
+
+
+def test_a_failed_batch_leaves_no_task(run_scenario):
+    session = run_scenario("batch")
+    assert session["failed log"].count("The cloud has no points of class 99") == 2
+    assert session["tasks left"] == []
+
+
+def test_the_standard_of_the_sample_is_not_that_of_the_user(run_scenario):
+    assert run_scenario("onwards")["standard of the next dialog"] == "DETECT"
+
+
+def test_saved_layers_are_those_of_the_file(run_scenario):
+    session = run_scenario("onwards")
+    said, *files = session["saved"]
+    assert said == "Saved run.gpkg and run report.html. The project uses this file from now on."
+    assert files == ["run report.html", "run.gpkg"]
+    assert session["sources"] == ["run.gpkg"]
+    assert session["decided"] == ["rejected", ""]
+
+
+def test_runs_are_in_groups_and_named_by_their_input(run_scenario):
+    assert run_scenario("onwards")["groups"] == {
+        "Station along axis: sample": ["Layer with kilometres: sample"],
+        "Fit alignment: sample": ["Elements: sample", "Deviations: sample"],
+        "Extract rails: sample": [
+            *("Findings: sample", "Track centerlines: sample", "Rails: sample", "Track geometry: sample"),
+        ],
+    }
+
+
+def test_the_next_step_after_a_fit_exports_its_elements(run_scenario):
+    session = run_scenario("onwards")
+    assert session["fit"].startswith("Next: Export the elements for design software…")
+    assert session["exported"] == "Elements: sample"
+
+
+def test_a_copy_with_kilometres_has_the_style_of_its_layer(run_scenario):
+    session = run_scenario("onwards")
+    assert session["aliases"] == ["In doubt [m]", "Kilometre"]
+    assert "#d62839" in session["colours"]
 
 
 def test_model_takes_a_folder_and_runs(run_scenario):

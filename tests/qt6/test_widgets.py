@@ -100,9 +100,9 @@ def test_the_dialog_offers_steps_and_fits_its_help(application, dialog):
     dialog.run_again = ran.append
     dialog._failure = UnclassifiedError
     dialog.after_run(False, {}, None)
-    (button,) = dialog.messageBar().items
+    (item,) = dialog.messageBar().items
     assert "Find the rail points" in dialog.findChild(QTextEdit, "txtLog").toPlainText()
-    button.click()
+    item.findChild(QPushButton).click()
     assert ran == [{"CLASSIFY": True}]
     assert not turn(dialog.mainWidget().combo).isAccepted()
     assert not turn(dialog.mainWidget().number).isAccepted()
@@ -218,7 +218,7 @@ def test_rails_are_clicked_on_the_map(application, monkeypatch):
         tool.keyPressEvent(QKeyEvent(QEvent.Type.KeyPress, key, NO_KEYS))
     assert done == ["place", "undo", "accept"]
     window = QMainWindow()
-    grown = GrowRails(stub.Nothing(), stub.Nothing(), lambda: None, window)
+    grown = GrowRails(stub.Nothing(), stub.Nothing(), window)
     bar = window.addToolBar("Rail Extract")
     bar.addActions(grown.actions)
     bar.addWidget(grown.standards)

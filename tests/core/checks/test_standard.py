@@ -5,15 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from rail_extract.core.checks.gauge_estimate import SEEN_SHARE
-from rail_extract.core.checks.standard import head_widths, warn_of_gauge, warn_of_spacing
+from rail_extract.core.checks.standard import head_widths, warn_of_gauge, warn_of_raw, warn_of_spacing
 from rail_extract.core.clouds.points import RailPoints
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.parameters import Parameters
 from rail_extract.core.progress import Progress
-from rail_extract.core.rails import RailLine
+from rail_extract.core.rails import RailLine, SearchFigures
 from rail_extract.core.squares.grid import MemorySource
 from rail_extract.laboratory.curves import Element, trace, transition_curve
 from rail_extract.laboratory.scenes.adversarial import from_the_side
+from rail_extract.laboratory.scenes.raw_strips import strip
 from rail_extract.laboratory.scenes.strips import two_passes
 
 WIDTH = 0.072
@@ -38,7 +39,7 @@ class Sampled:
     def __init__(self, xyz):
         self._xyz = xyz
 
-    def sample(self):
+    def sample(self, count=0):
         return self._xyz, None
 
 
@@ -135,3 +136,19 @@ def test_blunt_heads_are_said_and_their_width_is_not_measured():
     assert not widths.differ and np.isnan(widths.seen_m)
     (warning,) = heard.said
     assert warning.startswith("Heads are blunt") and "72 mm" in warning
+
+
+@pytest.mark.parametrize(
+    ("gauge_m", "found", "proposed"),
+    [
+        (1.000, SearchFigures(points=474, paired_m=5.0), ["EN_60E1_1435"]),
+        (1.000, SearchFigures(), ["EN_60E1_1435"]),
+        (1.000, SearchFigures(points=9000, paired_m=200.0, single_m=20.0), []),
+        (1.435, SearchFigures(points=474, paired_m=5.0), []),
+    ],
+)
+def test_a_search_that_finds_next_to_nothing_says_which_gauge_the_cloud_has(gauge_m, found, proposed):
+    heard = Warnings()
+    is_warned = warn_of_raw(Sampled(strip(12.0).xyz), found, Parameters(gauge_m, WIDTH), heard)
+    assert (is_warned, heard.proposed) == (bool(proposed), proposed)
+    assert all("mm apart are expected: is it EN 60E1" in text for text in heard.said)

@@ -61,3 +61,11 @@ def test_a_groove_whose_one_wall_is_hidden_gives_the_same_axes(seen_m):
     assert (found & on & here).sum() / (on & here).sum() > 0.9
     assert np.mean(inside[found & here & on]) == pytest.approx(-WIDTH / 2, abs=0.003)
     assert (found & on).sum() / found.sum() > 0.93
+
+
+def test_grooves_are_found_as_far_from_the_scanner_as_they_hold_a_row_of_points():
+    xyz, on, _ = street(0.003)
+    few = np.random.RandomState(3).random_sample(len(xyz)) < 0.07
+    found = classify_square(xyz[few], SETTINGS).rail
+    here = np.abs(turned(xyz[few], 0.3)[0]) < 3
+    assert (found & on[few] & here).sum() / (on[few] & here).sum() > 0.9

@@ -110,6 +110,16 @@ def test_feet_and_webs_are_not_labelled():
     assert xyz[found, 2].min() > TOP_M - 0.045
 
 
+@pytest.mark.parametrize(("width_m", "expected"), [(0.002, False), (0.030, True), (WIDTH, True)])
+def test_a_lone_profile_of_the_scanner_is_no_rail(width_m, expected):
+    rng = np.random.RandomState(9)
+    bed = rough(flat(8.0, rng=rng, per_m2=1500), rng)
+    along, across = rng.uniform(-4, 4, 3000), rng.uniform(-width_m / 2, width_m / 2, 3000)
+    bar = np.column_stack([along + MIDDLE[0], across + MIDDLE[1], rng.normal(TOP_M, 0.002, len(along))])
+    bed = bed[np.abs(bed[:, 1] - MIDDLE[1]) > WIDTH]
+    assert classify_square(np.concatenate([bed, bar]), SETTINGS).rail.any() == expected
+
+
 @pytest.fixture(scope="module")
 def wide():
     """A track across several squares."""

@@ -62,20 +62,20 @@ def test_proposed_guides_lead_to_lines_on_two_workers(flown, tmp_path, capsys):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["--centerlines", "out.gpkg"], "Give --proposed to have guides proposed, or --guide to fit tracks."),
-        (["--proposed", "p.gpkg", "--report", "r.html"], "--report is written with --guide only: leave it out."),
-        (["--guide", "g.gpkg"], "Give --centerlines for the lines."),
-        (
-            ["--guide", "g.gpkg", "--centerlines", "o.gpkg", "--proposed", "p.gpkg"],
-            "--proposed is written without --guide",
-        ),
+        (["--centerlines", "out.gpkg"], "--guide is empty: choose lines along the tracks, or --proposed to have some"),
+        (["--proposed", "p.gpkg", "--classes", "256"], '--classes "256" must be whole numbers from 0 to 255 such as'),
     ],
 )
-def test_outputs_of_the_other_mode_are_refused(flown, tmp_path, capsys, monkeypatch, words, message):
+def test_a_mistake_gets_a_sentence(flown, tmp_path, capsys, monkeypatch, words, message):
     monkeypatch.chdir(tmp_path)
     assert main(["airborne", str(flown / "air.laz"), *words]) == 1
     assert message in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
+
+
+def test_an_output_that_a_run_does_not_make_is_said(flown, tmp_path, capsys):
+    assert run(flown, tmp_path, "--proposed", str(tmp_path / "proposed.gpkg")) == 0
+    assert "--proposed is not written: a run with these inputs does not make it." in capsys.readouterr().err
 
 
 def test_polygons_as_guide_are_refused(flown, tmp_path, capsys):

@@ -1,6 +1,7 @@
-"""The commands `fit`, `export-alignment`, `import-alignment`, `compare` and `stations`, one after another."""
+"""The commands of alignments, one after another, and what Python gives as functions of the same names."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -39,10 +40,10 @@ def folder(tmp_path_factory):
     line = surveyed(design, np.random.default_rng(2), 0.001) + CORNER
     written(place / "tracks.gpkg", "centerlines", [line], track_id=[4])
     written(place / "moved.gpkg", "centerlines", [line + [0, 0, 0.010]], track_id=[4])
-    assert main(["fit", str(place / "tracks.gpkg"), "--elements", str(place / "out.gpkg"),
+    assert main(["fit-alignment", str(place / "tracks.gpkg"), "--elements", str(place / "out.gpkg"),
                  "--deviations", str(place / "out.gpkg"), "--report", str(place / "fit.html")]) == 0  # fmt: skip
     file = str(place / "design.xml")
-    assert main(["export-alignment", f"{place / 'out.gpkg'}|layername=elements", file]) == 0
+    assert main(["export-alignment", f"{place / 'out.gpkg'}|layername=elements", "--output", file]) == 0
     return place
 
 
@@ -61,10 +62,18 @@ def test_fit_writes_elements_deviations_and_a_report(folder):
     assert "<svg" in (folder / "fit.html").read_text()
 
 
+def test_a_fit_says_how_far_the_track_lies_off_in_each_direction(folder, capsys):
+    assert main(["fit-alignment", str(folder / "tracks.gpkg"), "--elements", str(folder / "said.gpkg")]) == 0
+    away, _ = table(folder / "out.gpkg", "deviations")
+    across, height = (np.sqrt(np.nanmean(away[name] ** 2)) for name in ("slew_mm", "lift_mm"))
+    found = re.search(r"root mean square ([\d.]+) mm across, ([\d.]+) mm in height", capsys.readouterr().out)
+    assert [float(one) for one in found.groups()] == pytest.approx([across, height], abs=0.02)
+
+
 def test_a_fit_with_its_own_table_gives_the_same_elements(folder):
     out = folder / "again.gpkg"
     fixed = f"{folder / 'out.gpkg'}|layername=elements"
-    assert main(["fit", str(folder / "tracks.gpkg"), "--fixed", fixed, "--elements", str(out)]) == 0
+    assert main(["fit-alignment", str(folder / "tracks.gpkg"), "--fixed", fixed, "--elements", str(out)]) == 0
     rows, again = table(folder / "out.gpkg", "elements")[0], table(out, "elements")[0]
     assert again["type"].tolist() == rows["type"].tolist()
     np.testing.assert_allclose(again["s_from"], rows["s_from"], atol=0.01)
@@ -87,7 +96,7 @@ def test_a_design_is_read_again_and_compared_with_the_track(folder):
 def test_surveys_are_compared(folder, capsys):
     out = folder / "differences.gpkg"
     values = [str(folder / "tracks.gpkg"), str(folder / "moved.gpkg"), "--reference-sigma", "0", "--input-sigma", "1"]
-    values += ["--count-shift", "--output", str(out), "--report", str(folder / "differences.html")]
+    values += ["--no-ignore-shift", "--output", str(out), "--report", str(folder / "differences.html")]
     assert main(["compare", *values]) == 0
     rows, _ = table(out, "differences")
     np.testing.assert_allclose(rows["height_mm"], 10, atol=0.1)
@@ -138,14 +147,16 @@ def test_an_axis_may_state_kilometres_as_m_values(tmp_path):
 @pytest.mark.parametrize(
     ("values", "words"),
     [
-        (["fit", "nothing.gpkg", "--elements", "out.gpkg"], "can't be read as a vector file"),
-        (["fit", "{tracks}", "--elements", "out.gpkg", "--fixed", "{tracks}"], "--fixed is not an element table"),
-        (["export-alignment", "{tracks}", "out.xml"], "ELEMENTS is not an element table"),
-        (["export-alignment", "{elements}", "out.txt"], "let it end in .xml"),
+        (["fit-alignment", "nothing.gpkg", "--elements", "out.gpkg"], "can't be read as a vector file"),
+        (
+            ["fit-alignment", "{tracks}", "--elements", "out.gpkg", "--fixed", "{tracks}"],
+            "--fixed is not an element table",
+        ),
+        (["export-alignment", "{tracks}", "--output", "out.xml"], "INPUT is not an element table"),
+        (["export-alignment", "{elements}", "--output", "out.txt"], "let it end in .xml"),
         (["import-alignment", "{tracks}", "--elements", "out.gpkg"], "GeoPackage"),
-        (["import-alignment", "{xml}"], "Give --elements"),
-        (["import-alignment", "{xml}", "--deviations", "out.gpkg"], "give --tracks"),
-        (["compare", "{tracks}", "{tracks}", "--rails", "{tracks}"], "give --rails and --reference-rails"),
+        (["import-alignment", "{xml}", "--deviations", "out.gpkg"], "choose --tracks"),
+        (["compare", "{tracks}", "{tracks}", "--rails", "{tracks}"], "choose --reference-rails, too"),
         (["stations", "{tracks}", "{tracks}", "out.gpkg"], "AXIS has no M values"),
         (["stations", "{tracks}", "{tracks}", "out.gpkg", "--posts", "{tracks}"], "POSTS has no field"),
     ],

@@ -1,9 +1,8 @@
-import argparse
 import os
 import signal
 
 import pytest
-from rail_extract.core.commands.options import Console, add_length
+from rail_extract.core.commands.options import Console
 from rail_extract.core.errors import Cancelled
 
 
@@ -27,14 +26,3 @@ def test_an_interrupt_counts_even_where_its_exception_is_lost():
             other.check()
     finally:
         signal.signal(signal.SIGINT, before)
-
-
-@pytest.mark.parametrize("text", ["0", "-2", "nan", "inf", "wide"])
-def test_a_length_is_a_positive_number(text, capsys):
-    parser = argparse.ArgumentParser()
-    add_length(parser, "--reach", 2.5, "how far")
-    assert parser.parse_args([]).reach == 2.5
-    assert parser.parse_args(["--reach", "0.5"]).reach == 0.5
-    with pytest.raises(SystemExit):
-        parser.parse_args(["--reach", text])
-    assert f"argument --reach: {text} is not a positive number" in capsys.readouterr().err

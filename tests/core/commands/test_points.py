@@ -147,10 +147,10 @@ def test_a_guide_across_the_tracks_is_noticed(save, tmp_path, capsys):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--only-guided"], "--only-guided needs lines to compare tracks with: give --guide."),
-        (["--workers", "-1"], "--workers must be a number from 0 to 1000, not -1."),
-        (["--workers", "1001"], "--workers must be a number from 0 to 1000, not 1001."),
-        (["--rail-class", "256"], "--rail-class must be a number from 0 to 255, not 256."),
+        (["--only-guided"], "--only-guided needs lines to compare tracks with: choose --guide."),
+        (["--workers", "-1"], "--workers can't be -1: give a number from 0 to 1,000."),
+        (["--workers", "1001"], "--workers can't be 1001: give a number from 0 to 1,000."),
+        (["--rail-class", "256"], "--rail-class can't be 256: give a number from 0 to 255."),
         (["--guide", "nothing.json"], "nothing.json can't be read as a vector file: give a GeoPackage or GeoJSON"),
         (["--guide", "far.json"], "The guide has no line within 4 m of the cloud: check its place and coordinate"),
         (["--guide", "empty.json"], "empty.json has no lines: give lines along the tracks."),
@@ -173,7 +173,7 @@ def raw(save):
 
 def test_a_copy_has_the_rail_that_grew_from_a_seed(raw, tmp_path, capsys):
     new = tmp_path / "out" / "new.las"
-    assert main(["grow", raw, "--output", str(new), "--seed", f"{X},{Y}", "--rail-class", "20", "--single"]) == 0
+    assert main(["grow", raw, "--output", str(new), "--seed", f"{X},{Y}", "--rail-class", "20", "--no-both"]) == 0
     found = np.asarray(laspy.read(new).classification) == 20
     left = STRIP.head & (STRIP.xyz[:, 1] > 0)
     assert (found & left).sum() > 0.94 * left.sum()
@@ -228,14 +228,14 @@ def test_rails_grow_and_are_extracted_in_one_call(save, tmp_path):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ([], "A rail is followed from seeds: give --seeds or --seed."),
+        ([], "A rail is followed from seeds: choose a layer for --seeds, or pick a point for --seed."),
         (["--seed", "5"], '--seed "5" should be two numbers: x,y.'),
         (["--seed", "nan,5"], '--seed "nan,5" should be two numbers: x,y.'),
         (["--seed", "1e300,5"], '--seed "1e300,5" should be two numbers: x,y.'),
         (["--seed", "1,2"], "No seed is in the cloud"),
-        (["--seed", f"{X},{Y}", "--max-outliers", "-1"], "--max-outliers must be 0 or more, not -1."),
-        (["--seed", f"{X},{Y}", "--stops", "a.shp"], "The option --stops writes .gpkg files: give a.shp this suffix."),
-        (["--seed", f"{X},{Y}", "--rail-class", "300"], "--rail-class must be a number from 0 to 255, not 300."),
+        (["--seed", f"{X},{Y}", "--max-outliers", "-1"], "--max-outliers can't be -1: give a number from 0 to 1,000."),
+        (["--seed", f"{X},{Y}", "--stops", "a.shp"], "--stops can't be a.shp: let it end in .gpkg or .dxf or .csv."),
+        (["--seed", f"{X},{Y}", "--rail-class", "300"], "--rail-class can't be 300: give a number from 0 to 255."),
     ],
 )
 def test_each_mistake_of_a_growth_gets_a_sentence(raw, tmp_path, capsys, options, message):

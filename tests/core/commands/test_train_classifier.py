@@ -120,8 +120,16 @@ FAULTS = {
         "The labelled rails all lie in one place of 20 m: give a longer labelled cloud",
     ),
     "suffix": (labels(lambda xyz, codes: (xyz, codes)), ["--weights", "w.pt"], "w.pt is not a name for weights"),
-    "card": (labels(lambda xyz, codes: (xyz, codes)), ["--weights", "w.npz", "--card", "./w.npz"], "are the same file"),
-    "epochs": (labels(lambda xyz, codes: (xyz, codes)), ["--epochs", "0"], "--epochs must be 1 or more, not 0."),
+    "card": (
+        labels(lambda xyz, codes: (xyz, codes)),
+        ["--weights", "w.npz", "--card", "./w.npz"],
+        "let it end in .html",
+    ),
+    "epochs": (
+        labels(lambda xyz, codes: (xyz, codes)),
+        ["--epochs", "0"],
+        "--epochs can't be 0: give a number from 1",
+    ),
 }
 
 

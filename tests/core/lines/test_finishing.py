@@ -12,7 +12,6 @@ from rail_extract.core.lines.finishing import (
     finished,
     parts_without_turns,
     thin,
-    turn_deg,
     united,
 )
 from rail_extract.core.parameters import Parameters
@@ -158,7 +157,7 @@ def test_no_line_of_a_damaged_network_turns_as_no_rail_can(seed):
     raster = rasterize(damaged(layout, seed), CELL_M)
     rails = lines_of(raster, 10, None, Parameters(1.435, SIZE.head_width_m))
     # The angle is measured from other stations here, and simplified lines have corners of a degree.
-    assert all(turn_deg(rail.xyz[:, :2]) <= MAX_TURN_DEG + 1.5 for rail in rails)
+    assert all(len(parts_without_turns(rail.xyz[:, :2], 0.0, 0.1, MAX_TURN_DEG + 1.5)) == 1 for rail in rails)
 
 
 def rail(xyz):

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.polyline import length_along, project
 from rail_extract.core.rails import RailLine, Support
-from rail_extract.core.squares.grid import HALO_M, Square, unique_keys
+from rail_extract.core.squares.grid import HALO_M, Square, Tiling
 from rail_extract.core.squares.pieces import trim
 from rail_extract.core.squares.seams import join
 
@@ -28,7 +28,7 @@ def rail(xyz, gaps=()):
 
 def seen_by_squares(lines, error_m=0.0):
     """The lines that each square would find: the true lines around it, with a small error and cut at REACH."""
-    keys = {key for line in lines for key in unique_keys(line.xyz, SIDE)[0]}
+    keys = {key for line in lines for key in Tiling(SIDE).keys(line.xyz)[0]}
     results = []
     for key in sorted(keys):
         square = Square.on_grid(key, SIDE, FRAME)

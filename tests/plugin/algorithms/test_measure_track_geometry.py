@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from memory_layers import layer_of
 from qgis.core import NULL, QgsVectorLayer
-from rail_extract.rail_extract_plugin.reading import track_inputs
+from rail_extract.core.jobs import track_inputs
 
 SPACING_MM = 1507.0
 RADIUS_M = 300.0

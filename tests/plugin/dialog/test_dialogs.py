@@ -14,7 +14,7 @@ from rail_extract.rail_extract_plugin.dialog.help_panel import ADVANCED
 from rail_extract.rail_extract_plugin.dialog.sections import OTHERS, section_of
 from rail_extract.rail_extract_plugin.dialog.wording import for_user, with_labels
 
-NAMES = [one.NAME for one in ALGORITHMS]
+NAMES = [one.JOB.name for one in ALGORITHMS]
 SMALLEST_ICON = 16
 
 
@@ -147,7 +147,7 @@ def test_an_id_of_several_choices_has_the_words_of_the_parameter_named_before(ma
     said = "ENGINE OPENCV can't use DEVICE CUDA: set DEVICE to AUTO, or ENGINE to AUTO."
     assert with_labels(said, definitions) == (
         '"Engine of the network" "OpenCV" can\'t use "Device of the network" "Nvidia GPU": set "Device of the network" '
-        'to "GPU if there is one", or "Engine of the network" to "The faster one".'
+        'to "GPU if there is one", or "Engine of the network" to "PyTorch if it is installed".'
     )
     assert with_labels("AUTO is best.", definitions, "MODEL") == '"Automatic" is best.'
 

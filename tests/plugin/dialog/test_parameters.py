@@ -1,12 +1,11 @@
 import pytest
 from qgis.core import QgsProcessingParameterDefinition
+from rail_extract.core.jobs.values import CHOICES, GROWTH, NUMBERS, class_numbers
 from rail_extract.core.parameters import DEFAULT_STEP_M, DEFAULT_WORKERS, FitParameters, GrowParameters, Parameters
-from rail_extract.rail_extract_plugin.dialog.parameter_values import CHOICES, GROWTH, NUMBERS, class_numbers
 
 CORE_DEFAULTS = {name: getattr(Parameters, field) for name, field in {**NUMBERS, **CHOICES}.items()}
-CORE_DEFAULTS |= {"ITERATIONS": Parameters.passes, "STEP": DEFAULT_STEP_M, "WORKERS": DEFAULT_WORKERS}
+CORE_DEFAULTS |= {"STEP": DEFAULT_STEP_M, "WORKERS": DEFAULT_WORKERS}
 GROW_DEFAULTS = {name: getattr(GrowParameters, field) for name, field in GROWTH.items()}
-GROW_DEFAULTS |= {"BOTH": GrowParameters.both, "MAX_OUTLIERS": GrowParameters.max_outliers}
 FIT_DEFAULTS = {"MIN_LENGTH": FitParameters.min_length_m, "TRANSITIONS": FitParameters.transitions}
 OWN_DEFAULTS = {"growrailpoints": GROW_DEFAULTS, "fitalignment": FIT_DEFAULTS}
 

@@ -11,8 +11,8 @@ from qgis.PyQt.QtCore import QPoint, Qt
 from qgis.PyQt.QtTest import QTest
 from qgis.PyQt.QtWidgets import QFileDialog, QMainWindow
 from rail_extract.laboratory.scenes.raw_strips import SPACING_M, strip
-from rail_extract.rail_extract_plugin.growing.tool import GrowRails
 from rail_extract.rail_extract_plugin.notices import notices
+from rail_extract.rail_extract_plugin.paths import SAMPLE
 
 CORNER = np.array([500_000.0, 3_000_000.0, 100.0])
 TRACK = strip(12.0)
@@ -46,8 +46,10 @@ def layer(qgis, plugin, write_cloud):
 
 @pytest.fixture
 def growing(qgis, canvas):
+    from rail_extract.rail_extract_plugin.growing.tool import GrowRails  # needs QGIS's processing framework
+
     window, messages = QMainWindow(), QgsMessageBar()
-    made = GrowRails(canvas, messages, lambda: None, window)
+    made = GrowRails(canvas, messages, window)
     made.bar = messages
     yield made
     made.close_for_good()
@@ -88,7 +90,7 @@ def test_a_click_shows_both_rails_of_the_track_and_their_ends(qgis, canvas, laye
     assert lines(seed) == [pytest.approx(23, abs=1.5)]
     assert seed.bands[-1].asGeometry().constGet().numGeometries() == 2
     assert growing.message.startswith("Followed 1")
-    assert "where the cloud ends" in growing.message
+    assert growing.message.endswith(": at both ends, the cloud ends.")
     assert growing.accept_action.isEnabled()
 
 
@@ -172,8 +174,11 @@ def test_a_click_beside_the_cloud_says_so(qgis, canvas, layer, growing):
 
 def test_of_several_clouds_one_is_to_be_selected(qgis, canvas, layer, growing):
     QgsProject.instance().addMapLayer(QgsPointCloudLayer("", "other", ""))
+    growing.clouds.set_value(None)
     growing.click(place(6.0, 0.0))
-    assert growing.message == "Select a point cloud in the layer panel, then click on a rail."
+    assert growing.message.startswith("Choose the point cloud in the toolbar")
+    canvas.setCurrentLayer(layer)
+    assert growing.clouds.value() == layer.id()
 
 
 def test_without_a_layer_a_file_is_taken(qgis, canvas, plugin, growing, write_cloud, monkeypatch):
@@ -188,6 +193,30 @@ def test_without_a_layer_a_file_is_taken(qgis, canvas, plugin, growing, write_cl
     assert growing.dialog.mainWidget().createProcessingParameters()["INPUT"] == path
 
 
+def test_a_file_is_shown_and_can_be_changed(qgis, canvas, plugin, growing, write_cloud, tmp_path):
+    here, elsewhere = write_cloud(TRACK.xyz + CORNER, "here.laz", 2), write_cloud(TRACK.xyz, "elsewhere.laz", 2)
+    growing.clouds.set_value(str(elsewhere))
+    growing.click(place(6.0, SPACING_M / 2))
+    wait(qgis, growing)
+    assert growing.message.startswith("The cloud has no point here")
+    assert growing.clouds.combo.currentText() == str(elsewhere)
+    growing.clouds.set_value(str(here))
+    growing.click(place(6.0, SPACING_M / 2))
+    wait(qgis, growing)
+    assert len(growing.seeds) == 1
+
+
+def test_a_cloud_with_rail_points_is_named_before_the_click(qgis, canvas, plugin, growing, write_cloud):
+    growing.clouds.set_value(str(write_cloud(TRACK.xyz + CORNER, "raw.laz", 2)))
+    growing.grow_action.trigger()
+    assert growing.message == ""
+    growing.clouds.set_value(str(SAMPLE / "sample.laz"))
+    assert growing.message.startswith("This cloud has points of class 10")
+    growing.message = ""
+    growing.grow_action.trigger()
+    assert "Extract Rails uses them as they are" in growing.message
+
+
 def test_messages_are_not_read_as_html(growing):
     growing._say("<img src='//server/share/x.las'> does not exist")
     assert "&lt;img" in growing.bar.currentItem().text()
@@ -197,7 +226,7 @@ def test_a_second_cloud_has_to_wait(qgis, canvas, layer, growing):
     growing.click(place(6.0, SPACING_M / 2))
     wait(qgis, growing)
     other = QgsProject.instance().addMapLayer(QgsPointCloudLayer("", "other", ""))
-    growing._active_layer = lambda: other
+    canvas.setCurrentLayer(other)
     growing.click(place(6.0, SPACING_M / 2))
     assert growing.message.startswith("Rails of another point cloud are still shown")
     assert len(growing.seeds) == 1

@@ -3,7 +3,8 @@ from qgis.core import QgsCoordinateReferenceSystem, QgsPointCloudLayer, QgsProje
 from rail_extract.core.clouds.readers import read_header
 from rail_extract.core.clouds.vpc import catalogue_text
 from rail_extract.core.errors import CloudError
-from rail_extract.rail_extract_plugin.reading.clouds import CloudSource, cloud_source
+from rail_extract.core.jobs.clouds import CloudSource
+from rail_extract.rail_extract_plugin.reading.clouds import cloud_source
 
 
 @pytest.fixture

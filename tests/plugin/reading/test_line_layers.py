@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 from memory_layers import layer_of
-from rail_extract.rail_extract_plugin.reading.line_layers import read_rails
+from rail_extract.core.progress import SILENT
+from rail_extract.rail_extract_plugin.reading.line_layers import read_lines
 
 LEFT = "LINESTRING Z (500000 3000001.507 100, 500020 3000001.507 100)"
 RIGHT = "LINESTRING Z (500020 3000000 100.02, 500000 3000000 100.02)"
@@ -30,12 +31,16 @@ class Source:
     def getFeatures(self, request, flags):
         return self._layer.getFeatures(request)
 
+    def fields(self):
+        return self._layer.fields()
+
     def featureCount(self):
         return self._layer.featureCount()
 
 
 def rails_of(layer):
-    return read_rails(Source(layer))
+    lines = read_lines(Source(layer))
+    return lines.rails(SILENT), lines.frame
 
 
 def test_lines_keep_their_coordinates(layer):

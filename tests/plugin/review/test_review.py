@@ -10,11 +10,11 @@ from qgis.PyQt.QtCore import Qt
 from qgis.PyQt.QtWidgets import QMainWindow
 from rail_extract.core.fields import FINDING_FIELDS, RAIL_FIELDS
 from rail_extract.core.frame import LocalFrame
-from rail_extract.rail_extract_plugin.reading.clouds import CloudSource
+from rail_extract.core.jobs.clouds import CloudSource
 from rail_extract.rail_extract_plugin.review.findings import ACCEPTED, REJECTED, reviews
 from rail_extract.rail_extract_plugin.review.section_view import PAPER, POINT, RAIL
 from rail_extract.rail_extract_plugin.writing.layers import fields
-from rail_extract.rail_extract_plugin.writing.run import properties_of
+from rail_extract.rail_extract_plugin.writing.run import RUN, properties_of
 
 ZERO = LocalFrame(np.zeros(3))
 
@@ -200,7 +200,7 @@ def test_layers_that_come_and_go_are_followed(load, dock, project):
 def cloud(write_cloud, track):
     """A track with its properties, as a run gives them to its layers."""
     path = write_cloud(track())
-    return path, properties_of(CloudSource((path,)), (10,), 0.072, ZERO)
+    return path, {RUN: "this run", **properties_of(CloudSource((path,)), (10,), 0.072, ZERO)}
 
 
 def test_the_section_shows_points_and_rails_of_the_run(qgis, load, dock, cloud):

@@ -90,6 +90,6 @@ def test_pins_are_the_versions_of_qgis():
 def test_toolbox_loads_without_any_package(reasons_without):
     need_numpy = ("skimage", "matplotlib", "shapely")
     reasons = reasons_without(*(package.module for package in PACKAGES), *need_numpy)
-    assert set(reasons) == {algorithm.NAME for algorithm in ALGORITHMS}
+    assert set(reasons) == {algorithm.JOB.name for algorithm in ALGORITHMS}
     assert {name for name, reason in reasons.items() if not reason} == {"installpackages", "checkinstallation"}
     assert "numpy, scipy, laspy, lazrs, cv2, pyproj" in reasons["extractrails"]

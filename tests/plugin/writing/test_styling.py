@@ -1,8 +1,8 @@
 """The appearance of results that QGIS loads."""
 
 import gc
+from functools import partial
 
-import numpy as np
 import pytest
 from memory_layers import layer_of
 from qgis.core import (
@@ -12,9 +12,11 @@ from qgis.core import (
     QgsExpressionContextUtils,
     QgsFeature,
     QgsGeometry,
+    QgsLayerTree,
     QgsMapRendererParallelJob,
     QgsMapSettings,
     QgsProcessingContext,
+    QgsProcessingUtils,
     QgsProject,
     QgsRasterLayer,
     QgsRectangle,
@@ -25,12 +27,10 @@ from qgis.core import (
 from qgis.PyQt.QtCore import QSize
 from qgis.PyQt.QtGui import QColor
 from rail_extract.core.fields import PRODUCTS
-from rail_extract.core.frame import LocalFrame
 from rail_extract.rail_extract_plugin import compat
 from rail_extract.rail_extract_plugin.paths import STYLES
-from rail_extract.rail_extract_plugin.reading.clouds import CloudSource
 from rail_extract.rail_extract_plugin.writing.layers import fields
-from rail_extract.rail_extract_plugin.writing.run import properties_of
+from rail_extract.rail_extract_plugin.writing.run import RUN, SOURCE, TOOL, new_run
 from rail_extract.rail_extract_plugin.writing.styling import style_on_load
 
 SHAPES = {
@@ -221,20 +221,48 @@ def test_the_review_is_chosen_from_a_list(styled):
     assert choices == {"open": "", "accepted": "accepted", "rejected": "rejected"}
 
 
-def test_layers_are_named_by_cloud_and_numbered_by_run(load, tmp_path):
-    frame, project, names = LocalFrame(np.zeros(3)), QgsProject.instance(), []
-    clouds = [CloudSource((tmp_path / name,)) for name in ("a.laz", "a.laz", "b.copc.laz")]
-    runs = [properties_of(cloud, (10,), 0.072, frame) for cloud in clouds]
-    for properties in (*runs, {}):
+def groups():
+    """Return the names of the groups of the project, with those of their layers."""
+    top = QgsProject.instance().layerTreeRoot().children()
+    return {one.name(): [node.name() for node in one.children()] for one in top if QgsLayerTree.isGroup(one)}
+
+
+def test_layers_are_named_by_input_and_grouped_and_numbered_by_run(load, context, tmp_path):
+    project, fit = QgsProject.instance(), "Fit alignment"
+    run = partial(new_run, "Extract rails", context=context)
+    tracks = project.addMapLayer(layer_of())
+    tracks.setName("siding 4")
+    runs = [run(value=str(tmp_path / name)) for name in ("a.laz", "a.laz", "b.copc.laz")]
+    runs += [run(value=f"{tmp_path}/all.gpkg|layername=tracks"), new_run(fit, tracks.id(), context)]
+    for properties in (*runs, run(value=f"{QgsProcessingUtils.tempFolder()}/between.tif")):
         for title in ("Rails", "Findings"):
             layer = project.addMapLayer(layer_of())
             layer.setName(title)
-            names.append(load(layer, "rails", properties, title).name())
-    named = [f"{title}{of_cloud}" for of_cloud in (": a", ": a 2", ": b", "") for title in ("Rails", "Findings")]
-    assert names == named
+            load(layer, title.lower(), properties, title)
+    rails = next(one for one in project.mapLayers().values() if one.name() == "Rails: b")
+    elements = project.addMapLayer(layer_of())
+    elements.setName("Elements")
+    load(elements, "elements", new_run(fit, rails.id(), context), "Elements")
+    named = {"Extract rails: a": "a", "Extract rails: a 2": "a 2", "Extract rails: b": "b"}
+    named |= {"Extract rails: tracks": "tracks", "Fit alignment: siding 4": "siding 4"}
+    expected = {group: [f"Findings: {of}", f"Rails: {of}"] for group, of in named.items()}
+    assert groups() == {**expected, "Fit alignment: b": ["Elements: b"]}
     mine = project.addMapLayer(layer_of())
     mine.setName("my file")
     assert load(mine, "rails", runs[0], "Rails").name() == "my file"
+    assert "my file" in groups()["Extract rails: a"]
+
+
+def test_a_copy_with_kilometres_looks_like_its_original(load, context):
+    original = QgsProject.instance().addMapLayer(layer_of(LINE, fields="&field=kind:string"))
+    original.renderer().symbol().setColor(QColor("#123456"))
+    original.setFieldAlias(0, "Kind of crossing")
+    original.setCustomProperty(RUN, "another run")
+    copy = layer_of(LINE, fields="&field=kind:string&field=km:double")
+    load(copy, "places", new_run("Station along axis", original.id(), context))
+    assert copy.renderer().symbol().color().name() == "#123456"
+    assert [copy.attributeAlias(number) for number in range(2)] == ["Kind of crossing", "Kilometre"]
+    assert copy.customProperty(RUN) != "another run"
 
 
 @pytest.mark.parametrize("style", DRAWN)
@@ -269,8 +297,10 @@ def test_layers_of_a_run_are_in_order_however_they_are_loaded(load, context, loa
     project, root = QgsProject.instance(), QgsProject.instance().layerTreeRoot()
     project.addMapLayer(QgsVectorLayer("LineString", "other", "memory"))
     for style in loaded:
-        layer = project.addMapLayer(QgsVectorLayer("LineStringZ", style, "memory"))
-        load(layer, style, {"rail_extract/run": "one"})
+        layer = project.addMapLayer(QgsVectorLayer("LineStringZ", style, "memory"), False)
+        # QGIS adds layers to the group in which one is selected: here, from the second on, to that of the run.
+        (root.findGroup("Extract rails: a") or root).insertLayer(0, layer)
+        load(layer, style, {RUN: "one", TOOL: "Extract rails", SOURCE: "a"})
     order = [style for style in ("findings", "centerlines", "rails", "quality") if style in loaded]
     assert [node.name() for node in root.findLayers()] == [*order, "other"]
     assert len(project.mapLayers()) == len(loaded) + 1

@@ -7,17 +7,17 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from qgis.core import QgsProcessingFeatureSource
 
-from ...core.errors import RailExtractError
-from ...core.frame import LocalFrame
-from ...core.progress import Progress
-from ...core.rails import Centerline, RailLine, TrackGeometry
-from ...core.squares.spool import SpooledPoints
-from ...core.standards import RAIL_CLASS
-from .area_points import Area, check_same_plane, spool_points_in
-from .clouds import Bounds, CloudSource
-from .line_layers import read_centerlines, read_rails
+from ..errors import RailExtractError
+from ..frame import LocalFrame
+from ..progress import Progress
+from ..rails import Centerline, RailLine, TrackGeometry
+from ..squares.spool import SpooledPoints
+from ..standards import RAIL_CLASS
+from .area_points import Area, spool_points_in
+from .clouds import Bounds
+from .reading import way
+from .values import Values
 
 MARGIN_M = 1.0
 """Margin around the rails' extent within which points are read: more than ten times the railhead width."""
@@ -49,42 +49,25 @@ class TrackInputs:
     frame: LocalFrame
 
 
-def read_inputs(
-    centerlines: QgsProcessingFeatureSource,
-    rails: QgsProcessingFeatureSource,
-    cloud: CloudSource | None,
-    folder: Path,
-    progress: Progress,
-) -> TrackInputs:
-    """Read the lines, and sort the points around the rails into squares in a folder.
-
-    Parameters
-    ----------
-    centerlines, rails : QgsProcessingFeatureSource
-    cloud : CloudSource or None
-    folder : Path
-    progress : Progress
+def read_inputs(values: Values, folder: Path, progress: Progress) -> TrackInputs:
+    """Read INPUT and RAILS, and sort the points of POINTS around the rails into squares in a folder.
 
     Raises
     ------
-    CrsError
-        The coordinate systems differ or are in degrees.
-    NoRailPointsError
-        The cloud has no points of a rail's class in the area.
     RailExtractError
-        A layer has no line.
+        The coordinate systems differ or are in degrees, the cloud has no points of a rail's class in the area, or a
+        layer has no line.
     """
-    tracks, frame = read_centerlines(centerlines, progress.span(0.0, 0.1))
-    lines, rail_frame = read_rails(rails, progress.span(0.1, 0.2), "RAILS", RAIL_CLASS)
-    check_same_plane("RAILS", rail_frame.crs_wkt, "INPUT", frame)
-    check_same_plane("INPUT", frame.crs_wkt, "RAILS", rail_frame)
-    lines = _moved(lines, rail_frame, frame)
-    if cloud is None:
+    centerlines, rails = values.lines("INPUT", progress.span(0.0, 0.1)), values.lines("RAILS", progress.span(0.1, 0.2))
+    tracks, lines, frame = centerlines.centerlines(), rails.rails(progress, RAIL_CLASS), centerlines.frame
+    shift = way("RAILS", rails.frame, "INPUT", frame)
+    lines = tuple(replace(line, xyz=line.xyz + shift) for line in lines)
+    if not values.filled("POINTS"):
         progress.info("Without POINTS, sigma_mm and points of each rail are taken as uniform along it.")
         return TrackInputs(tracks, lines, (), frame)
     classes = tuple(sorted({rail.class_code for rail in lines}))
     area = Area("rails", classes, _bounds(lines, frame), frame)
-    clouds = tuple(spool_points_in(area, cloud, SQUARE_M, folder, progress.span(0.2, 1.0)).values())
+    clouds = tuple(spool_points_in(area, values.cloud("POINTS"), SQUARE_M, folder, progress.span(0.2, 1.0)).values())
     theirs = clouds[0].frame
     tracks, lines = _moved(tracks, frame, theirs), _moved(lines, frame, theirs)
     return TrackInputs(tracks, lines, clouds, frame.with_origin(theirs.shift_to(frame)))

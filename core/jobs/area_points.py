@@ -7,18 +7,15 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
-from qgis.core import QgsCoordinateReferenceSystem
-
-from ...core.clouds.crs import parse_crs, same_plane, units
-from ...core.clouds.points import RailPoints
-from ...core.errors import CrsError, NoRailPointsError
-from ...core.frame import LocalFrame
-from ...core.progress import Progress
-from ..systems import system
+from ..clouds.points import RailPoints
+from ..errors import NoRailPointsError
+from ..frame import LocalFrame
+from ..progress import Progress
 from .clouds import Bounds, BoundsIn, CloudSource, crs_of, read_points, spool_points
+from .reading import check_same_plane
 
 if TYPE_CHECKING:
-    from ...core.squares.spool import SpooledPoints
+    from ..squares.spool import SpooledPoints
 
 Points = TypeVar("Points", RailPoints, "SpooledPoints")
 
@@ -89,7 +86,7 @@ def _all_of(
     """Read points with `read`, and check that there are some of each class."""
     check_same_plane("POINTS", crs_of(cloud), f"the {area.what}", area.frame)
 
-    def bounds(crs: QgsCoordinateReferenceSystem) -> Bounds:
+    def bounds(_: str | None) -> Bounds:
         return area.bounds
 
     source = replace(cloud, crs_wkt=cloud.crs_wkt or area.frame.crs_wkt)
@@ -104,38 +101,3 @@ def _all_of(
             f"give the cloud from which the {area.what} came."
         )
     return clouds
-
-
-def check_same_plane(name: str, crs_wkt: str | None, other_name: str, other: LocalFrame) -> None:
-    """Check that two inputs have the same coordinate system in plan; an unknown one is taken to be the other.
-
-    Parameters
-    ----------
-    name : str
-        Name of the first input, for the message.
-    crs_wkt : str or None
-        Coordinate system of the first input.
-    other_name : str
-        Name of the second input.
-    other : LocalFrame
-        Frame of the second input.
-
-    Raises
-    ------
-    CrsError
-        Both systems are known and differ, or the second is unknown and the first is not in metres.
-    """
-    if crs_wkt and other.crs_wkt and not same_plane(crs_wkt, other.crs_wkt, tuple(other.origin[:2])):
-        raise CrsError(
-            f"{name} are in {_title(crs_wkt)} but {other_name} in {_title(other.crs_wkt)}: give both in the "
-            "same coordinate system."
-        )
-    if crs_wkt and not other.crs_wkt and units(parse_crs(crs_wkt))[0] != other.horizontal_unit_m:
-        raise CrsError(
-            f"{name} are in {_title(crs_wkt)}, whose unit is not the metre: assign a coordinate system to {other_name} "
-            "too."
-        )
-
-
-def _title(wkt: str) -> str:
-    return system(wkt).description()

@@ -1,0 +1,357 @@
+"""The values of a run that a command line or Python gives: texts, numbers, and files."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any, Callable
+
+import numpy as np
+
+from ..clouds.crs import MAX_COORDINATE, is_geographic, parse_crs
+from ..clouds.readers import CATALOGUE, paths_of
+from ..disk import Destination, writing
+from ..errors import CrsError, ParameterError, RailExtractError
+from ..jobs import declaration as kinds
+from ..jobs.clouds import Bounds, CloudSource, checked_crs
+from ..jobs.declaration import Job, Parameter
+from ..jobs.result import Result
+from ..jobs.shared import WEB_PAGES
+from ..jobs.values import Rows, Values
+from ..progress import Progress
+from ..scratch import scratch_folder
+from ..tasks import Runner
+from ..workers.runner import workers
+from .options import vector_module
+
+if TYPE_CHECKING:
+    from ..airborne.survey import Guide
+    from ..alignment.placed_axes import PlacedAxes
+    from ..jobs.lines import Lines
+    from .vectors import Features
+
+Spell = Callable[[Parameter], str]
+"""Returns how a front end names a parameter."""
+
+LAYERS, PAGES = (".gpkg", ".dxf", ".csv"), (".html", ".htm")
+"""Suffixes of the files for layers, of which only a GeoPackage holds several, and for web pages."""
+
+
+class FileValues(Values):
+    """Values of the parameters of one run of a job.
+
+    Parameters
+    ----------
+    job : Job
+    given : mapping of str to object
+        Values and files by the name of the parameter or output; None, or none, where one is left empty.
+    command : str
+        What repeats the run.
+    keeps : bool
+        Whether the result stays after the run.
+
+    Raises
+    ------
+    ParameterError, DiskError
+        A value is wrong, or an output could not be written after the run.
+    """
+
+    def __init__(self, job: Job, given: Mapping[str, Any], command: str, keeps: bool = False) -> None:
+        self.job, self._command, self._keeps, self._features = job, command, keeps, dict[str, "Features"]()
+        self._values = {one.name: read_value(one, given.get(one.name)) for one in job.parameters}
+        self._filled = {name for name, one in given.items() if not (one is None or (isinstance(one, str) and not one))}
+        named = {one.name: given.get(one.name) for one in job.outputs}
+        self.destinations = destinations_of(job, {name: Path(file) for name, file in named.items() if file is not None})
+
+    def __getitem__(self, name: str) -> Any:
+        """Return the value of a parameter, by its kind; None if it is empty, and the WKT of a coordinate system."""
+        return self._values[name]
+
+    @property
+    def command(self) -> str:
+        """What repeats the run."""
+        return self._command
+
+    def filled(self, name: str) -> bool:
+        """Return whether a value was given; a default does not count."""
+        return name in self._filled
+
+    def wanted(self, name: str) -> bool:
+        """Return whether an output is to be written."""
+        return name in self.destinations
+
+    def path(self, name: str) -> Path:
+        """Return the file that an output names, before the run."""
+        return self.destinations[name].path
+
+    def destination(self, name: str) -> Destination:
+        """Return the file of an output that is wanted."""
+        return self.destinations[name]
+
+    def title(self, name: str) -> str:
+        """Return the file that was given for an input; empty without one."""
+        return str(self._values[name] or "")
+
+    def prepare(self, crs_wkt: str | None) -> None:
+        """Do nothing: only QGIS builds its coordinate systems before a run."""
+
+    def runner(self) -> AbstractContextManager[Runner]:
+        """Provide the runner with as many processes as WORKERS asks for."""
+        return workers(self["WORKERS"])
+
+    def system(self, name: str) -> str | None:
+        """Return the coordinate system of a layer as WKT; None if it has none."""
+        return self.features(name).crs_wkt
+
+    def rows(self, name: str, progress: Progress) -> Rows:
+        """Read the fields of a layer."""
+        features = self.features(name)
+        return features.rows(), list(features.columns)
+
+    def lines(self, name: str, progress: Progress) -> Lines:
+        """Read the lines of a layer."""
+        return self.features(name).lines(progress)
+
+    def axes(self, crs_wkt: str | None) -> PlacedAxes:
+        """Read AXIS and what states its kilometres, in a coordinate system."""
+        return vector_module("AXIS", "kilometres").read_axes(self, None, crs_wkt)[0]
+
+    @property
+    def keeps(self) -> bool:
+        """Whether the result stays after the run, so that its layers can be had without naming files."""
+        return self._keeps
+
+    def cloud(self, name: str = "INPUT") -> CloudSource:
+        """Return the files of a cloud, and which of their points count."""
+        source = CloudSource(tuple(paths_of(self[name])), self["CRS"], leave_out=self._values.get("LEAVE_OUT") or ())
+        if not (self.has("MASK") and self.filled("MASK")):
+            return source
+        return replace(source, mask=vector_module("MASK").read_mask(self["MASK"], checked_crs(source)))
+
+    def extent(self, crs_wkt: str | None) -> Bounds | None:
+        """Return EXTENT, which is in the coordinate system of the cloud."""
+        return self["EXTENT"]
+
+    @contextmanager
+    def scratch(self) -> Iterator[Path]:
+        """Provide a folder for the points of a run: next to the first output, where there is space for it."""
+        if not self.destinations:
+            with TemporaryDirectory() as folder:
+                yield Path(folder)
+            return
+        parent = next(iter(self.destinations.values())).file.parent
+        with writing(parent), scratch_folder(parent) as folder:
+            yield folder
+
+    def lines_along(self, name: str, crs_wkt: str | None) -> list[np.ndarray]:
+        """Read lines that show places along tracks, (k, 2) each, in a coordinate system."""
+        return vector_module(name).read_lines(self[name], crs_wkt)
+
+    def guides(self, name: str, crs_wkt: str | None) -> list[Guide]:
+        """Read such lines with what they state of their tracks."""
+        return vector_module(name).read_guides(self[name], crs_wkt)
+
+    def seeds(self, crs_wkt: str | None) -> list[np.ndarray]:
+        """Read SEEDS and SEED in a coordinate system: points, (1, 2), and lines, (k, 2)."""
+        found = vector_module("SEEDS").read_seeds(self["SEEDS"], crs_wkt) if self.filled("SEEDS") else []
+        return [*found, *(np.array([place]) for place in self._values.get("SEED") or ())]
+
+    def features(self, name: str) -> Features:
+        """Read a layer, once."""
+        if name not in self._features:
+            self._features[name] = vector_module(name).read_features(self[name], name)
+        return self._features[name]
+
+
+def run_with_files(
+    job: Job, given: Mapping[str, Any], command: str, progress: Progress, spell: Spell, keeps: bool = False
+) -> Result:
+    """Run a job and write the outputs that were given; one that fails does not stop the others.
+
+    Parameters
+    ----------
+    job, given, command, keeps
+        See `FileValues`.
+    progress : Progress
+    spell : callable
+        Returns how messages name a parameter.
+
+    Raises
+    ------
+    RailExtractError
+        A value is wrong, or an output could not be written.
+    """
+    try:
+        values = FileValues(job, given, command, keeps)
+        job.check(values)
+        result = job.run(values, progress)
+        for name in sorted(set(values.destinations) - {*result.layers, *result.pages, *result.figures}):
+            progress.warning(f"{name} is not written: a run with these inputs does not make it.")
+        errors = list(_failures(result, values))
+        if len(errors) > 1:
+            raise RailExtractError(" ".join(map(str, errors)))
+        if errors:
+            raise errors[0]
+        return result
+    except RailExtractError as error:
+        error.args = (job.reworded(str(error), spell),)
+        raise
+
+
+def _failures(result: Result, values: FileValues) -> Iterator[RailExtractError]:
+    """Write what is wanted of a result, layers of one file together, and yield the errors."""
+    writers: list[Callable[[], None]] = []
+    layers = {name: make() for name, make in result.layers.items() if values.wanted(name)}
+    for file in dict.fromkeys(values.destination(name).file for name in layers):
+        names = [name for name in layers if values.destination(name).file == file]
+        writing_module = vector_module(names[0], ".output.writing")
+        together = [layers[name] for name in names], values.destination(names[0]), result.frame
+        writers.append(partial(writing_module.write_layers, *together))
+    pages = {name: make for name, make in result.pages.items() if values.wanted(name)}
+    writers += [partial(_write_page, values.destination(name), make) for name, make in pages.items()]
+    for write in writers:
+        try:
+            write()
+        except RailExtractError as error:
+            yield error
+
+
+def _write_page(destination: Destination, make: Callable[[], str]) -> None:
+    destination.write_text(make())
+
+
+def read_value(one: Parameter, given: Any) -> Any:
+    """Return the value of a parameter that was given, its default if nothing was.
+
+    Raises
+    ------
+    ParameterError
+        It is wrong, or missing.
+    """
+    if given is None or (isinstance(given, str) and not given):
+        if one.required:
+            raise ParameterError(one.refusal(None))
+        return None if given == "" and one.optional else one.default
+    try:
+        return READERS.get(type(one), lambda one, given: str(given))(one, given)
+    except (TypeError, ValueError):
+        raise ParameterError(one.refusal(given)) from None
+
+
+def _number(one: kinds.Number, given: Any) -> float:
+    value = float(given)
+    if not (one.low <= value <= one.high) or (one.whole and not value.is_integer()):
+        raise ValueError
+    return int(value) if one.whole else value
+
+
+def _chosen(one: kinds.Choice, given: Any) -> Any:
+    """Read a choice: one id, several, or the place of one."""
+    if one.numbered:
+        return range(len(one.options)).index(int(given))
+    if not one.several:
+        return one.options[one.options.index(given)]
+    words = given.split(",") if isinstance(given, str) else given
+    return tuple(one.options[one.options.index(word.strip().upper())] for word in words)
+
+
+def _system(one: kinds.System, given: Any) -> str:
+    """Read a coordinate system.
+
+    Raises
+    ------
+    ParameterError
+    """
+    try:
+        crs = parse_crs(str(given))
+    except CrsError:
+        raise ParameterError(f"{one.name} {given} is not a coordinate system: give one such as EPSG:25832.") from None
+    if is_geographic(crs):
+        raise ParameterError(
+            f"{one.name} {given} is in degrees, where lengths can't be measured: give a projected one."
+        )
+    return crs.to_wkt()
+
+
+def _extent(one: kinds.Extent, given: Any) -> Bounds:
+    """Read a rectangle; the order of its numbers is that of command lines and Python, not that of QGIS.
+
+    Raises
+    ------
+    ParameterError
+    """
+    try:
+        xmin, ymin, xmax, ymax = map(float, given.split(",") if isinstance(given, str) else given)
+    except (TypeError, ValueError):
+        raise ParameterError(f'{one.name} "{given}" should be four numbers: xmin,ymin,xmax,ymax.') from None
+    return xmin, ymin, xmax, ymax
+
+
+def _places(one: kinds.Place, given: Any) -> list[tuple[float, float]]:
+    """Read one place or several, as texts or as pairs of numbers.
+
+    Raises
+    ------
+    ParameterError
+    """
+    several = isinstance(given, Sequence) and not isinstance(given, str) and not isinstance(given[0], (int, float))
+    found = []
+    for place in given if several else [given]:
+        try:
+            x, y = map(float, place.split(",") if isinstance(place, str) else place)
+            if not max(abs(x), abs(y)) <= MAX_COORDINATE:
+                raise ValueError
+        except (TypeError, ValueError):
+            raise ParameterError(f'{one.name} "{place}" should be two numbers: x,y.') from None
+        found.append((x, y))
+    return found
+
+
+READERS: dict[type, Callable[[Any, Any], Any]] = {
+    kinds.Number: _number,
+    kinds.Flag: lambda one, given: bool(given),
+    kinds.Choice: _chosen,
+    kinds.Text: lambda one, given: given if isinstance(given, str) else ",".join(map(str, given)),
+    kinds.FileInput: lambda one, given: Path(given),
+    kinds.System: _system,
+    kinds.Extent: _extent,
+    kinds.Place: _places,
+    kinds.Cloud: lambda one, given: paths_of(given),
+}
+"""Functions that read a value, by the kind of the parameter; others are texts."""
+
+
+def destinations_of(job: Job, files: Mapping[str, Path]) -> dict[str, Destination]:
+    """Check that outputs can be written, make their folders, and return their destinations.
+
+    Raises
+    ------
+    ParameterError, DiskError
+        A required output is missing, one could not be written after the run, or two are the same file.
+    """
+    found: dict[str, Destination] = {}
+    shared: dict[Path, Destination] = {}
+    for one in job.outputs:
+        if one.name not in files:
+            if one.required:
+                raise ParameterError(one.refusal(None))
+            continue
+        path = files[one.name]
+        if isinstance(one, kinds.FileOutput) and CATALOGUE in one.kinds and not path.suffix:
+            path = path.with_suffix(CATALOGUE)
+        is_page = isinstance(one, kinds.FileOutput) and one.kinds == WEB_PAGES
+        suffixes = LAYERS if isinstance(one, kinds.LayerOutput) else PAGES if is_page else ()
+        if suffixes and path.suffix.lower() not in suffixes:
+            raise ParameterError(f"{one.name} can't be {path.name}: let it end in {' or '.join(suffixes)}.")
+        with writing(path.parent):
+            path.parent.mkdir(parents=True, exist_ok=True)
+        destination = Destination.at(path)
+        if destination.file in shared and path.suffix.lower() != ".gpkg":
+            other = next(name for name in found if found[name].file == destination.file)
+            raise ParameterError(f"{other} and {one.name} are the same file: give each its own name.")
+        found[one.name] = shared.setdefault(destination.file, destination)
+    return found

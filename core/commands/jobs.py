@@ -1,0 +1,78 @@
+"""A job as a command: its options have the names of its parameters and outputs, in small letters with hyphens."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+from ..jobs import CALLS
+from ..jobs import declaration as kinds
+from ..jobs.declaration import Job, Parameter
+from ..progress import Estimating
+from .files import run_with_files
+from .options import Console
+
+
+def __getattr__(name: str) -> Callable[[argparse.ArgumentParser], None]:
+    """Return the function that declares the command of a job."""
+    if name not in CALLS:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return partial(declare, CALLS[name])
+
+
+def declare(job: Job, parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of a job."""
+    for one in job.parameters:
+        _add(one, parser)
+    group = parser.add_argument_group("outputs", "Existing files are replaced. GeoPackages may be the same file.")
+    for output in job.outputs:
+        group.add_argument(
+            option(output), dest=output.name, required=output.required, metavar="FILE", help=_help(output)
+        )
+    parser.set_defaults(run=partial(_run, job))
+
+
+def option(one: Parameter) -> str:
+    """Return how a command line names a parameter or an output."""
+    return one.name if is_positional(one) else f"--{one.name.lower().replace('_', '-')}"
+
+
+def is_positional(one: Parameter) -> bool:
+    """Return whether a parameter has no option, because it must be given."""
+    return isinstance(one, kinds.Input) and one.required
+
+
+def _add(one: Parameter, parser: argparse.ArgumentParser) -> None:
+    """Declare the argument of a parameter, whose value is checked later, as a dialog does."""
+    if isinstance(one, kinds.Flag):
+        parser.add_argument(option(one), dest=one.name, action=argparse.BooleanOptionalAction, help=_help(one))
+    elif is_positional(one):
+        parser.add_argument(one.name, nargs="+" if isinstance(one, kinds.Cloud) else None, help=_help(one))
+    elif isinstance(one, kinds.Place):
+        parser.add_argument(option(one), dest=one.name, action="append", metavar="X,Y", help=_help(one))
+    else:
+        parser.add_argument(option(one), dest=one.name, metavar=_metavar(one), help=_help(one))
+
+
+def _metavar(one: Parameter) -> str:
+    """Return what stands for the value in the help."""
+    if isinstance(one, kinds.Choice):
+        return "NAME" if len(one.options) > kinds.FEW else "|".join(one.options)
+    return "N" if isinstance(one, kinds.Number) else "FILE" if isinstance(one, kinds.Input) else "TEXT"
+
+
+def _help(one: Parameter) -> str:
+    """Return label, help and default of a parameter."""
+    default = "" if one.default is None else f" (default: {one.default})"
+    return f"{one.label}. {one.help}{default}".replace("%", "%%")
+
+
+def _run(job: Job, args: argparse.Namespace) -> None:
+    """Run with what was given, and print the result in words."""
+    given: dict[str, Any] = {one.name: getattr(args, one.name) for one in (*job.parameters, *job.outputs)}
+    progress = Estimating(Console(lambda sentence: job.reworded(sentence, option)))
+    result = run_with_files(job, given, args.command_line, progress, option)
+    for sentence in result.sentences:
+        print(sentence)

@@ -1,0 +1,208 @@
+"""Track Centerlines from Airborne Lidar: fits the track of each guide in a cloud that shows no single railheads."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from ..errors import ParameterError
+from ..fields import AIRBORNE, PROPOSED
+from ..parameters import AIRBORNE_CLASSES, AirborneParameters
+from ..progress import Estimating
+from ..standards import SEARCHED_CLASSES
+from . import shared
+from .declaration import (
+    CLOUD_NEEDS,
+    CLOUD_WORDS,
+    POINT,
+    RAIL_WORDS,
+    RAW_CLOUDS,
+    TRACK_WORDS,
+    Figure,
+    Job,
+    LayerOutput,
+    Number,
+    Text,
+)
+from .values import class_numbers
+
+if TYPE_CHECKING:
+    from ..airborne.proposals import Proposals
+    from ..airborne.survey import Survey
+    from ..progress import Progress
+    from .result import Result
+    from .values import Values
+
+MAX_GUIDE_REACH_M, MAX_FOOTPRINT_M, MAX_RAIL_M = 6.0, 2.0, 0.5
+"""Beyond, a guide means another track, a footprint covers both rails, and a rail is not a rail."""
+
+
+def _check(values: Values) -> None:
+    """Check the rail, the classes and the guides, and that there are some or are to be some."""
+    values.airborne(values.standard())
+    _class_codes(values)
+    if values.filled("GUIDE"):
+        values.guides("GUIDE", values.cloud_crs())
+    elif not values.wanted("PROPOSED") and not values.keeps:
+        raise ParameterError("GUIDE is empty: choose lines along the tracks, or PROPOSED to have some proposed.")
+
+
+def _class_codes(values: Values) -> tuple[int, ...]:
+    """Return the classes to use; all but noise if none is named."""
+    classes = (values["CLASSES"] or "").strip()
+    return class_numbers(classes, "CLASSES") if classes else SEARCHED_CLASSES
+
+
+def _run(values: Values, progress: Progress) -> Result:
+    """Fit the tracks, or propose guides where there are none."""
+    from ..airborne.files import survey_files
+    from ..airborne.proposals import propose_guides
+    from ..airborne.run import Run
+    from .result import ShownCloud
+
+    progress, standard, codes = Estimating(progress), values.standard(), _class_codes(values)
+    request = values.request(codes, progress)
+    with values.runner() as runner, values.scratch() as folder:
+        run = Run(request, values.airborne(standard), folder / "points", runner, progress)
+        if values.filled("GUIDE"):
+            made = _fitted(survey_files(run, values.guides("GUIDE", values.cloud_crs())), values)
+        else:
+            made = _proposed(propose_guides(run))
+    return replace(made, cloud=ShownCloud("INPUT", codes, standard.head_width_m))
+
+
+def _proposed(found: Proposals) -> Result:
+    """Return the proposed guides as a result."""
+    from ..output.layers import lines_layer
+    from .result import Result
+
+    figures = {"PROPOSED_LENGTH": found.length_m, "DENSITY": round(found.density, 1)}
+    layers = {"PROPOSED": lambda: lines_layer(PROPOSED, found.guides)}
+    return Result(figures, found.frame, layers, sentences=(found.summary,))
+
+
+def _fitted(survey: Survey, values: Values) -> Result:
+    """Return what was found along the guides as a result."""
+    from ..output.layers import airborne_stations_layer, findings_layer, lines_layer
+    from ..report.airborne import airborne_findings, airborne_page, airborne_summary
+    from .result import Result
+
+    facts = {"Rail": values.standard().label, "Command": values.command}
+    figures: dict[str, Any] = {
+        **shared.figures_of(survey.lines, "CENTERLINE"),
+        "GUIDE_LENGTH": survey.guides_m,
+        "SEEN_LENGTH": survey.seen_m,
+        "DENSITY": round(survey.density, 1),
+    }
+    return Result(
+        figures,
+        survey.frame,
+        {
+            "CENTERLINES": lambda: lines_layer(AIRBORNE, survey.lines),
+            "STATIONS": lambda: airborne_stations_layer(survey.tracks),
+            "FINDINGS": lambda: findings_layer(airborne_findings(survey)),
+        },
+        {"REPORT": lambda: airborne_page(survey, values.cloud().paths[0].resolve().name, facts)},
+        tuple(airborne_summary(survey)),
+    )
+
+
+JOB = Job(
+    "airbornecenterlines",
+    "Track centerlines from airborne lidar",
+    "Fits the centerlines of tracks in airborne lidar, along lines that say which tracks are meant.",
+    "For the clouds of national surveys, with 5 to 100 points per square metre, which show no single railheads; "
+    "for mobile lidar, use Extract Rails.\n\n"
+    "A line ends where the track is not seen for more than 30 m; the stations state why. The standard error "
+    "leaves out that of the flight against its datum, often 3 to 10 cm.\n\n"
+    "Without a guide, the whole cloud is searched, in minutes per square kilometre. Correct the guides that are "
+    "proposed, and run again with them.",
+    (*RAIL_WORDS, *CLOUD_WORDS, *TRACK_WORDS, "airborne", "ALS", "national", "OpenStreetMap", "centerline"),
+    CLOUD_NEEDS,
+    (
+        replace(shared.CLOUD, label="Airborne point cloud (layer, file or folder)"),
+        Text(
+            "CLASSES",
+            "Classes",
+            "Classes of the points to use: by default unclassified and ground. Empty uses all but noise.",
+            advanced=True,
+            optional=True,
+            default=",".join(map(str, AIRBORNE_CLASSES)),
+        ),
+        replace(
+            shared.GUIDE,
+            help="One line for each track of the railway, such as railway=rail of OpenStreetMap, up to 3 m off. Give "
+            "every track its guide: they are fitted together. Leave empty to have guides proposed.",
+            advanced=False,
+        ),
+        *shared.RAIL,
+        Number(
+            "REACH",
+            "Reach [m]",
+            "Largest distance of a track from its guide.",
+            advanced=True,
+            default=AirborneParameters.reach_m,
+            low=0.5,
+            high=MAX_GUIDE_REACH_M,
+        ),
+        Number(
+            "FOOTPRINT",
+            "Footprint [m]",
+            "Diameter of the laser beam on the ground: flying height times divergence, such as 1000 m times 0.25 mrad. "
+            "If it is not known, 0.3 m suits most flights; a warning says if the rails look wider.",
+            default=AirborneParameters.footprint_m,
+            low=0.01,
+            high=MAX_FOOTPRINT_M,
+        ),
+        Number(
+            "RAIL_HEIGHT",
+            "Rails above the bed [m]",
+            "Top of the rails above the bed between them, which the points show. It depends on the ballast.",
+            advanced=True,
+            default=AirborneParameters.rail_height_m,
+            high=MAX_RAIL_M,
+        ),
+        *shared.AREA,
+        shared.WORKERS,
+    ),
+    (
+        replace(
+            shared.CENTERLINES_OUTPUT,
+            help="Lines in the middle of the tracks at the top of the rails, where they are seen, with standard "
+            "errors.",
+        ),
+        LayerOutput(
+            "STATIONS",
+            "Stations",
+            "A point every 10 m along each guide: whether the track is seen, or why not; bed, cant, radius, gradient "
+            "and standard errors.",
+            advanced=True,
+            optional=True,
+            kind=POINT,
+        ),
+        shared.FINDINGS_OUTPUT,
+        LayerOutput(
+            "PROPOSED",
+            "Proposed guides",
+            "Only where GUIDE is empty: lines along which tracks seem to lie, with a score. Delete or move what is "
+            "wrong, add what is missing, and run again with this layer as GUIDE.",
+            advanced=True,
+            optional=True,
+        ),
+        shared.REPORT,
+    ),
+    (
+        *shared.CENTERLINE_FIGURES,
+        Figure("GUIDE_LENGTH", "Length of the guides [m]"),
+        Figure("SEEN_LENGTH", "Length on which tracks are seen [m]"),
+        Figure("DENSITY", "Points per square metre along the guides"),
+        Figure("PROPOSED_LENGTH", "Length of the proposed guides [m]"),
+    ),
+    RAW_CLOUDS,
+    picture="gauge.svg",
+    guide="airborne",
+    pages=("airborne", "parameters"),
+    call="airborne",
+    check=_check,
+    run=_run,
+)

@@ -1,0 +1,587 @@
+"""The parameters, outputs and figures that several jobs share."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from ..alignment.km_text import HECTOMETRES, NOTATIONS
+from ..design_numbers import KM
+from ..fields import BRIDGED, LENGTH, SIGMA
+from ..frpdf import DEVICES, ENGINES, MAX_PASSES
+from ..frpdf.models import NAMES
+from ..parameters import (
+    DEFAULT_STEP_M,
+    DEFAULT_WORKERS,
+    GEOMETRY,
+    LEAVE_OUT,
+    MAX_WORKERS,
+    METHODS,
+    Parameters,
+)
+from ..standards import CUSTOM, DEFAULT, DETECT, LAST_CLASS, RAIL_CLASS, STANDARDS
+from .declaration import (
+    FINE_M_DECIMALS,
+    LINE,
+    MM_DECIMALS,
+    POINT,
+    POLYGON,
+    TABLE,
+    Choice,
+    Cloud,
+    Extent,
+    FieldInput,
+    Figure,
+    FileInput,
+    FileOutput,
+    LayerInput,
+    LayerOutput,
+    Number,
+    Output,
+    Parameter,
+    RasterInput,
+    System,
+    Text,
+)
+
+if TYPE_CHECKING:
+    from ..rails import TrackGeometry
+
+# The maxima below only reject values that must be millimetres in a field of metres; they are not recommendations.
+
+MAX_TOLERANCE_M = 0.5
+"""Points further away than about half of the narrowest gauge in use (600 mm) may belong to another rail."""
+
+MAX_SIMPLIFICATION_M = 1.0
+"""A line simplified with a larger tolerance no longer represents a rail, which is about 0.07 m wide."""
+
+MAX_SMOOTHING_M = 100.0
+"""Removes even the tightest curves and dips of a railway."""
+
+MAX_CROWN_RADIUS_M = 10_000.0
+"""A disc of this radius is practically flat over any dip."""
+
+MAX_LENGTH_M = 100_000.0
+"""Longer than any gap to close, any minimum line length and any step between stations."""
+
+INCREASING, DECREASING = DIRECTIONS = ("INCREASING", "DECREASING")
+"""Whether kilometres increase from the first vertex of an axis."""
+
+WEIGHT_FILES, WEB_PAGES = "Weights (*.npz)", "Web pages (*.html)"
+
+CLOUD = Cloud(
+    "INPUT",
+    "Point cloud (layer, file or folder)",
+    "A loaded point cloud layer, or the path of a LAS, LAZ or COPC file, of a folder of such files, or of "
+    "a virtual point cloud (.vpc).",
+)
+RAW_CLOUD = replace(CLOUD, help=f"{CLOUD.help} It needs no classes.")
+RAIL_CLASSES = Text(
+    "RAIL_CLASSES",
+    "Rail classes",
+    "Classes of the points on rails, such as 10 or 10,11. Each class is processed separately.",
+    default=str(RAIL_CLASS),
+)
+RASTER = RasterInput(
+    "INPUT",
+    "Rail raster",
+    "One band per class, with 1 where there is rail, as from Rasterize Rail Points. North up, square cells.",
+)
+
+STANDARD = Choice(
+    "STANDARD",
+    "Rail standard",
+    "Rail profile and gauge, which give the rail spacing and the railhead width. CUSTOM takes both from GAUGE and "
+    "HEAD_WIDTH.",
+    options=(*STANDARDS, CUSTOM),
+    default=DEFAULT,
+)
+DETECTED_STANDARD = replace(
+    STANDARD,
+    help=f"{STANDARD.help} DETECT measures the rails in part of the points, and says how sure it is.",
+    options=(*STANDARD.options, DETECT),
+)
+GAUGE = Number(
+    "GAUGE",
+    "Gauge [mm]",
+    "Distance between the inner faces of the two railheads. Leave empty to use the value of the standard.",
+    advanced=True,
+    optional=True,
+    low=1.0,
+    decimals=MM_DECIMALS,
+)
+HEAD_WIDTH = replace(
+    GAUGE,
+    name="HEAD_WIDTH",
+    label="Railhead width [mm]",
+    help="Width of the head of one rail. Leave empty to use the value of the standard.",
+)
+RAIL = (STANDARD, GAUGE, HEAD_WIDTH)
+
+_UNSTATED = "Needed for a raster from other software, which does not state {}. Overrides the tag of the raster."
+RASTER_RAIL = (
+    replace(GAUGE, help=_UNSTATED.format("its gauge")),
+    replace(HEAD_WIDTH, help=_UNSTATED.format("the width")),
+)
+"""Gauge and railhead width for a raster without tags."""
+
+OTHER_GAUGES = Text(
+    "OTHER_GAUGES",
+    "Other gauges [mm]",
+    "Gauges of other tracks in the same cloud, such as 1000;1067, or 1000/66 with the width of the railhead.",
+    advanced=True,
+    optional=True,
+)
+PAIRING: tuple[Parameter, ...] = (
+    OTHER_GAUGES,
+    Number(
+        "CENTERLINE_TOLERANCE",
+        "Gauge tolerance of tracks [m]",
+        "Rails whose gauge deviates by more than this do not make a track.",
+        advanced=True,
+        default=Parameters.centerline_tolerance_m,
+        low=0.001,
+        high=MAX_TOLERANCE_M,
+    ),
+)
+
+CRS = System(
+    "CRS",
+    "CRS of a cloud without one",
+    "Projected coordinate system for files that do not state one; other files keep their own.",
+    advanced=True,
+    optional=True,
+)
+LEFT_OUT = Choice(
+    "LEAVE_OUT",
+    "Points to leave out",
+    "OVERLAP leaves out points that are marked as overlap of strips, SYNTHETIC those that are marked as computed, not "
+    "measured. Withheld points are always left out.",
+    advanced=True,
+    optional=True,
+    options=LEAVE_OUT,
+    several=True,
+)
+AREA: tuple[Parameter, ...] = (
+    Extent(
+        "EXTENT",
+        "Extent",
+        "Only points inside this rectangle are read. Leave empty to read all points.",
+        advanced=True,
+        optional=True,
+    ),
+    LayerInput(
+        "MASK",
+        "Mask",
+        "Only points inside these polygons are read, for example a strip along the line.",
+        advanced=True,
+        optional=True,
+        transformed=True,
+        kinds=(POLYGON,),
+    ),
+    CRS,
+    LEFT_OUT,
+)
+
+GUIDE = LayerInput(
+    "GUIDE",
+    "Guide",
+    "Lines along the tracks, from a map such as OpenStreetMap or drawn by hand. Rails are searched near them only. "
+    "Lines in another coordinate system are transformed.",
+    advanced=True,
+    optional=True,
+    transformed=True,
+)
+SEEDS = LayerInput(
+    "SEEDS",
+    "Seeds",
+    "Points on railheads, or lines along them, one for each rail or track to follow. In another coordinate system they "
+    "are transformed. The map tool Grow Rails makes such a layer.",
+    optional=True,
+    transformed=True,
+    kinds=(POINT, LINE),
+)
+METHOD: tuple[Parameter, ...] = (
+    Choice(
+        "METHOD",
+        "What finds rail points",
+        "The shape of rails, or a network that has learned them from labelled clouds and needs PyTorch.",
+        advanced=True,
+        options=METHODS,
+        default=GEOMETRY,
+    ),
+    FileInput(
+        "WEIGHTS",
+        "Weights of the classifier",
+        "The file that Train Rail Classifier has written, used if METHOD is LEARNED. Leave empty to use the weights "
+        "that were trained on simulated clouds.",
+        advanced=True,
+        optional=True,
+        kinds=WEIGHT_FILES,
+    ),
+)
+CONTENT: tuple[Parameter, ...] = (
+    Number(
+        "RAIL_CLASS",
+        "Class of rail points",
+        "The class that points on rails get. In point formats 0 to 5, classes end at 31.",
+        advanced=True,
+        default=RAIL_CLASS,
+        high=LAST_CLASS,
+        whole=True,
+    ),
+    Choice(
+        "CONTENT",
+        "Content of the output",
+        "The whole cloud (0), or only the points on rails (1).",
+        advanced=True,
+        default=0,
+        options=("Whole cloud", "Rail points only"),
+        numbered=True,
+    ),
+)
+"""The class of rail points, and whether the others are written as well."""
+
+RAILS_OF_CANT = LayerInput(
+    "RAILS",
+    "Rails",
+    "3D lines of both rails, for the cant where there is no track geometry.",
+    advanced=True,
+    optional=True,
+)
+
+MODEL = Choice(
+    "MODEL",
+    "Model",
+    "Trained weights of the network: base is the network of the paper, fast a smaller one. AUTO selects those that fit "
+    "the gauge and railhead width.",
+    options=NAMES,
+    default=Parameters.model,
+)
+DEVICE = Choice(
+    "DEVICE",
+    "Device of the network",
+    "CPU, or CUDA for an Nvidia GPU, which needs PyTorch. AUTO uses the GPU if there is one.",
+    advanced=True,
+    options=DEVICES,
+    default=Parameters.device,
+)
+CLEANUP: tuple[Parameter, ...] = (
+    Number(
+        "ITERATIONS",
+        "Passes of the network",
+        "Each pass starts from the result of the pass before. 0 repeats until fewer than one rail cell in a thousand "
+        "changes, with at most five passes.",
+        advanced=True,
+        default=Parameters.passes,
+        high=MAX_PASSES,
+        whole=True,
+    ),
+    Choice(
+        "ENGINE",
+        "Engine of the network",
+        "Python package that runs the network: PyTorch or OpenCV. AUTO uses PyTorch if it is installed.",
+        advanced=True,
+        options=ENGINES,
+        default=Parameters.engine,
+    ),
+    DEVICE,
+)
+
+SMOOTHING_XY = Number(
+    "SMOOTHING_XY",
+    "Smoothing in plan [m]",
+    "Standard deviation of the smoothing: bends shorter than a few times this length are flattened.",
+    advanced=True,
+    default=Parameters.smoothing_xy_m,
+    low=0.05,
+    high=MAX_SMOOTHING_M,
+)
+TOLERANCE_Z = Number(
+    "TOLERANCE_Z",
+    "Tolerance in height [m]",
+    "Only points within this distance below the top of the rail determine the height of the line.",
+    advanced=True,
+    default=Parameters.tolerance_z_m,
+    low=0.001,
+    high=MAX_TOLERANCE_M,
+)
+HEIGHTS = (
+    Number(
+        "SMOOTHING_Z",
+        "Smoothing in height [m]",
+        "If empty, heights are smoothed as much as the points require. Otherwise the standard deviation of the "
+        "smoothing of the paper: dips shorter than a few times this length are flattened.",
+        advanced=True,
+        optional=True,
+        low=0.05,
+        high=MAX_SMOOTHING_M,
+    ),
+    Number(
+        "TOLERANCE_XY",
+        "Tolerance in plan [m]",
+        "Only points within this distance of the line determine its height. Half the railhead width is the limit in "
+        "any case.",
+        advanced=True,
+        default=Parameters.tolerance_xy_m,
+        low=0.005,
+        high=MAX_TOLERANCE_M,
+    ),
+    TOLERANCE_Z,
+    Number(
+        "CROWN_RADIUS",
+        "Crown radius of the rolling disc [m]",
+        "A disc of this radius, rolled along the points from above, finds the top of the rail. The value hardly "
+        "affects the line: reduce it only where short, deep dips lose their points.",
+        advanced=True,
+        default=Parameters.crown_radius_m,
+        low=1.0,
+        high=MAX_CROWN_RADIUS_M,
+    ),
+)
+MAX_GAP = Number(
+    "MAX_GAP",
+    "Longest gap to close [m]",
+    "Line ends up to this distance apart are joined if they point at each other; 0 joins none. Where only one rail of "
+    "a track continues, the centerline follows it for up to 30 m, regardless of this value.",
+    advanced=True,
+    default=Parameters.max_gap_m,
+    high=MAX_LENGTH_M,
+)
+SIMPLIFY_XY = Number(
+    "SIMPLIFY_XY",
+    "Simplification in plan [m]",
+    "Vertices are removed while the line stays within this distance in plan.",
+    advanced=True,
+    default=Parameters.simplify_xy_m,
+    high=MAX_SIMPLIFICATION_M,
+    decimals=FINE_M_DECIMALS,
+)
+SIMPLIFY_Z = replace(
+    SIMPLIFY_XY,
+    name="SIMPLIFY_Z",
+    label="Simplification in height [m]",
+    help="Vertices are removed while the line stays within this distance in height.",
+    default=Parameters.simplify_z_m,
+)
+MIN_LENGTH = Number(
+    "MIN_LENGTH",
+    "Shortest line [m]",
+    "Shorter lines are dropped.",
+    advanced=True,
+    default=Parameters.min_length_m,
+    high=MAX_LENGTH_M,
+)
+LINES = (
+    SMOOTHING_XY,
+    *HEIGHTS,
+    MAX_GAP,
+    Number(
+        "GAP_ANGLE",
+        "Largest bend across a gap [°]",
+        "Line ends that meet at a larger angle are not joined.",
+        advanced=True,
+        default=Parameters.gap_angle_deg,
+        high=90.0,
+    ),
+    SIMPLIFY_XY,
+    SIMPLIFY_Z,
+    MIN_LENGTH,
+)
+"""How a raster becomes lines with heights."""
+
+STEP = Number(
+    "STEP",
+    "Step of the track geometry [m]",
+    "Distance between the stations along each track at which gauge, cant, twist, radius and gradient are given.",
+    advanced=True,
+    default=DEFAULT_STEP_M,
+    low=0.1,
+    high=MAX_LENGTH_M,
+)
+WORKERS = Number(
+    "WORKERS",
+    "Processes",
+    "Processes that compute at a time, on squares of a large cloud or on its files; results do not depend on them. 0 "
+    "starts one per core, as far as a quarter of the memory or 2 GB allow; 1 computes in QGIS itself.",
+    advanced=True,
+    default=DEFAULT_WORKERS,
+    high=MAX_WORKERS,
+    whole=True,
+)
+
+
+def axis(optional: bool) -> tuple[Parameter, ...]:
+    """Return the axis and what states its kilometres: the line, its start and posts in sight unless it is optional."""
+    return (
+        LayerInput(
+            "AXIS",
+            "Axis",
+            "Line that carries the kilometres: with M values in kilometres or metres, or with the fields below. In "
+            "another coordinate system it is transformed.",
+            advanced=optional,
+            optional=optional,
+            transformed=True,
+        ),
+        Number(
+            "START_KM",
+            "Start of the axis [km]",
+            "Kilometre at the first vertex of the axis, for an axis that is a single line. It overrides M values.",
+            advanced=optional,
+            optional=True,
+            low=KM.low,
+            high=KM.high,
+            decimals=6,
+        ),
+        Choice(
+            "DIRECTION",
+            "Kilometres along the axis",
+            "Whether kilometres increase or decrease from the start of the axis; used with its start kilometre.",
+            advanced=True,
+            options=DIRECTIONS,
+            default=INCREASING,
+        ),
+        LayerInput(
+            "POSTS",
+            "Kilometre posts",
+            "Points of kilometre or hectometre posts up to 50 m beside the axis. Kilometres are interpolated between "
+            "them. They override the start and M values.",
+            advanced=optional,
+            optional=True,
+            transformed=True,
+            kinds=(POINT,),
+        ),
+        *_NOTATION,
+    )
+
+
+_NOTATION: tuple[Parameter, ...] = (
+    FieldInput(
+        "POST_FIELD",
+        "Field of the posts with the kilometre",
+        "Numbers, or texts such as 12.3+45. Empty means the first of km, kilometre, km_text, station.",
+        advanced=True,
+        optional=True,
+        of="POSTS",
+    ),
+    LayerInput(
+        "JUMPS",
+        "Jumps of the kilometres",
+        "Table with the fields km_back, the kilometre before each jump, and km_ahead, the one behind it, in the order "
+        "of increasing kilometres.",
+        advanced=True,
+        optional=True,
+        kinds=(TABLE,),
+    ),
+    Choice(
+        "FORMAT",
+        "Kilometres as text",
+        "HECTOMETRES writes 12.3+45.67, KILOMETRES 12+345.67, GERMAN 12,3 + 46, and MILES 7 mi 1181.39 yd, in miles "
+        "and yards.",
+        advanced=True,
+        options=tuple(NOTATIONS),
+        default=HECTOMETRES,
+    ),
+)
+
+
+RAILS_OUTPUT = LayerOutput(
+    "RAILS",
+    "Rails",
+    "Lines along the top of the railheads, with length, support by points and standard error.",
+    optional=True,
+)
+CENTERLINES_OUTPUT = LayerOutput(
+    "CENTERLINES",
+    "Track centerlines",
+    "Lines midway between the two rails of each track, with gauge and cant.",
+    optional=True,
+)
+QUALITY_OUTPUT = LayerOutput(
+    "QUALITY",
+    "Track geometry",
+    "Points along each track with gauge, cant, twist, radius, gradient, standard error and support.",
+    optional=True,
+    kind=POINT,
+)
+FINDINGS_OUTPUT = LayerOutput(
+    "FINDINGS",
+    "Findings",
+    "Places to look at, with the reason, the most harmful first: the table of the report as lines to review.",
+    advanced=True,
+    optional=True,
+)
+ELEMENTS_OUTPUT = LayerOutput(
+    "ELEMENTS",
+    "Elements",
+    "The element table: a line for each element in plan, in height and of cant, with its figures.",
+    optional=True,
+)
+DEVIATIONS_OUTPUT = LayerOutput(
+    "DEVIATIONS",
+    "Deviations",
+    "Points along the design, one per metre, with slew, lift and difference of cant: measured minus design.",
+    advanced=True,
+    optional=True,
+    kind=POINT,
+)
+REPORT = FileOutput(
+    "REPORT",
+    "Report",
+    "A web page with an assessment of the result, a map, and plots of each track.",
+    optional=True,
+    kinds=WEB_PAGES,
+)
+ALIGNMENT_REPORT = replace(
+    REPORT,
+    help="A web page with a diagram of each track: curvature, cant, gradient, elements, slews and lifts, to print.",
+    on_demand=True,
+)
+CLASSIFIED: tuple[Output, ...] = (
+    FileOutput(
+        "OUTPUT",
+        "Classified point cloud",
+        "A LAZ or LAS file. For a folder of tiles or a virtual point cloud, a virtual point cloud (.vpc) and, next to "
+        "it, a folder of the same name with the tiles.",
+        kinds="LAZ files (*.laz);;LAS files (*.las);;Virtual point clouds (*.vpc)",
+    ),
+)
+CLASSIFIED_FIGURES = (
+    Figure("POINT_COUNT", "Number of points in the cloud"),
+    Figure("RAIL_POINTS", "Number of points on rails"),
+    Figure("PAIRED_LENGTH", "Length of the rails with a partner [m]"),
+    Figure("SINGLE_LENGTH", "Length of the rails without a partner [m]"),
+    Figure("CELLS_PER_M", "Cells with points per metre of rail"),
+)
+RAIL_FIGURES = Figure("RAIL_COUNT", "Number of rails"), Figure("RAIL_LENGTH", "Length of the rails [m]")
+CENTERLINE_FIGURES = (
+    Figure("CENTERLINE_COUNT", "Number of track centerlines"),
+    Figure("CENTERLINE_LENGTH", "Length of the track centerlines [m]"),
+)
+QUALITY_FIGURES = (
+    Figure("STATION_COUNT", "Number of measured stations"),
+    Figure("SIGMA", "Standard error of the centerlines, root mean square [mm]"),
+    Figure("BRIDGED_LENGTH", "Length of track where a rail has no points [m]"),
+)
+ALIGNMENT_FIGURES = (
+    Figure("ALIGNMENT_COUNT", "Number of alignments"),
+    Figure("ELEMENT_COUNT", "Number of elements"),
+)
+ENGINE_USED = Figure("ENGINE_USED", "Engine that ran the network", "text")
+
+
+def figures_of(lines: Sequence[Any], what: str) -> dict[str, Any]:
+    """Return the number and length of lines: RAIL_COUNT and RAIL_LENGTH if `what` is RAIL."""
+    return {f"{what}_COUNT": len(lines), f"{what}_LENGTH": LENGTH.value(sum(line.length_m for line in lines))}
+
+
+def figures_of_stations(tracks: Sequence[TrackGeometry]) -> dict[str, Any]:
+    """Return the number of stations, the standard error and the length without points, as outputs."""
+    sigma = [value for track in tracks for value in track.sigma_mm if math.isfinite(value)]
+    return {
+        "STATION_COUNT": sum(len(track.chainage_m) for track in tracks),
+        "SIGMA": SIGMA.value(math.sqrt(sum(value**2 for value in sigma) / len(sigma))) if sigma else None,
+        "BRIDGED_LENGTH": BRIDGED.value(sum(track.bridged_m for track in tracks)),
+    }

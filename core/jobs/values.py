@@ -1,0 +1,265 @@
+"""The values of a run, as every job reads them; QGIS, and the files of a command line or of Python, provide them."""
+
+from __future__ import annotations
+
+import re
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..disk import Destination
+from ..errors import ParameterError
+from ..parameters import AirborneParameters, GrowParameters, Parameters
+from ..standards import (
+    CUSTOM,
+    DEFAULT,
+    DETECT,
+    LAST_CLASS,
+    Gauge,
+    RailStandard,
+    is_class,
+    read_gauges,
+    resolve,
+)
+from .clouds import Bounds, CloudSource, checked_crs, request_points
+from .declaration import Job
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from ..airborne.survey import Guide
+    from ..alignment.placed_axes import PlacedAxes
+    from ..clouds.points import Request
+    from ..progress import Progress
+    from ..tasks import Runner
+    from .lines import Lines
+
+NUMBERS = {
+    "SMOOTHING_XY": "smoothing_xy_m",
+    "SMOOTHING_Z": "smoothing_z_m",
+    "TOLERANCE_XY": "tolerance_xy_m",
+    "TOLERANCE_Z": "tolerance_z_m",
+    "CROWN_RADIUS": "crown_radius_m",
+    "MAX_GAP": "max_gap_m",
+    "GAP_ANGLE": "gap_angle_deg",
+    "SIMPLIFY_XY": "simplify_xy_m",
+    "SIMPLIFY_Z": "simplify_z_m",
+    "MIN_LENGTH": "min_length_m",
+    "CENTERLINE_TOLERANCE": "centerline_tolerance_m",
+}
+"""Attribute of `Parameters` for each number of the interface."""
+
+CHOICES = {"ENGINE": "engine", "DEVICE": "device", "MODEL": "model", "STRIPS": "strips", "ITERATIONS": "passes"}
+"""The same for choices and whole numbers."""
+
+GROWTH = {
+    "BOTH": "both",
+    "SEARCH": "search_m",
+    "THICKNESS": "thickness_m",
+    "WINDOW": "window_m",
+    "MIN_HEIGHT": "min_height_m",
+    "TOLERANCE_Z": "tolerance_z_m",
+    "MAX_OUTLIERS": "max_outliers",
+    "MAX_LENGTH": "max_length_m",
+}
+"""The same for `GrowParameters`; TOLERANCE_Z has another default there."""
+
+AIRBORNE = {"REACH": "reach_m", "FOOTPRINT": "footprint_m", "RAIL_HEIGHT": "rail_height_m"}
+"""The same for `AirborneParameters`."""
+
+Rows = tuple[Sequence[Mapping[str, Any]], Sequence[str]]
+"""Values of the features of a layer by the name of the field, None where one is empty; and the names of all fields."""
+
+
+class Values(ABC):
+    """Values of the parameters of one run of a job."""
+
+    job: Job
+
+    @property
+    @abstractmethod
+    def command(self) -> str:
+        """What repeats the run, without passwords."""
+
+    @abstractmethod
+    def __getitem__(self, name: str) -> Any:
+        """Return the value of a parameter, by its kind; None if it is empty, and the WKT of a coordinate system."""
+
+    @abstractmethod
+    def filled(self, name: str) -> bool:
+        """Return whether a value was given; a default does not count."""
+
+    @abstractmethod
+    def wanted(self, name: str) -> bool:
+        """Return whether an output is to be written."""
+
+    @abstractmethod
+    def path(self, name: str) -> Path:
+        """Return the file that an output names, before the run."""
+
+    @abstractmethod
+    def destination(self, name: str) -> Destination:
+        """Return the file of an output that is wanted."""
+
+    @abstractmethod
+    def title(self, name: str) -> str:
+        """Return the name of the layer that was given for an input, to show to users; empty without one."""
+
+    @abstractmethod
+    def prepare(self, crs_wkt: str | None) -> None:
+        """Learn which coordinate system the results will have."""
+
+    @abstractmethod
+    def runner(self) -> AbstractContextManager[Runner]:
+        """Provide the runner with as many processes as WORKERS asks for."""
+
+    @abstractmethod
+    def system(self, name: str) -> str | None:
+        """Return the coordinate system of a layer as WKT; None if it has none."""
+
+    @abstractmethod
+    def rows(self, name: str, progress: Progress) -> Rows:
+        """Read the fields of a layer."""
+
+    @abstractmethod
+    def lines(self, name: str, progress: Progress) -> Lines:
+        """Read the lines of a layer."""
+
+    @abstractmethod
+    def axes(self, crs_wkt: str | None) -> PlacedAxes:
+        """Read AXIS and what states its kilometres, in a coordinate system."""
+
+    @abstractmethod
+    def cloud(self, name: str = "INPUT") -> CloudSource:
+        """Return the files of a cloud, and which of their points count."""
+
+    @abstractmethod
+    def extent(self, crs_wkt: str | None) -> Bounds | None:
+        """Read EXTENT in a coordinate system."""
+
+    @abstractmethod
+    def scratch(self) -> AbstractContextManager[Path]:
+        """Provide a folder for the points of a run."""
+
+    @abstractmethod
+    def lines_along(self, name: str, crs_wkt: str | None) -> Sequence[np.ndarray]:
+        """Read lines that show places along tracks, (k, 2) each, in a coordinate system."""
+
+    @abstractmethod
+    def guides(self, name: str, crs_wkt: str | None) -> Sequence[Guide]:
+        """Read such lines with what they state of their tracks."""
+
+    @abstractmethod
+    def seeds(self, crs_wkt: str | None) -> Sequence[np.ndarray]:
+        """Read SEEDS and SEED in a coordinate system: points, (1, 2), and lines, (k, 2)."""
+
+    @property
+    def keeps(self) -> bool:
+        """Whether the result stays after the run, so that its layers can be had without naming files."""
+        return False
+
+    def request(self, class_codes: Sequence[int], progress: Progress) -> Request:
+        """Check which points are to be read, and read the headers of the files."""
+        bounds = self.extent if self.has("EXTENT") else lambda _: None
+        return request_points(self.cloud(), class_codes, bounds, progress)
+
+    def cloud_crs(self) -> str | None:
+        """Return the coordinate system of the cloud; see `checked_crs`."""
+        return checked_crs(self.cloud())
+
+    def has(self, name: str) -> bool:
+        """Return whether the job has a parameter."""
+        return any(one.name == name for one in self.job.parameters)
+
+    def rails_only(self) -> bool:
+        """Return whether CONTENT leaves out what is not on rails."""
+        return self["CONTENT"] == 1
+
+    def airborne(self, standard: RailStandard) -> AirborneParameters:
+        """Read how tracks are looked for in an airborne cloud."""
+        return AirborneParameters(standard.gauge_m, standard.head_width_m, **self._stated(AIRBORNE))
+
+    def growth(self) -> GrowParameters:
+        """Read how rails are followed."""
+        return GrowParameters(**self._stated(GROWTH))
+
+    def has_axis(self) -> bool:
+        """Return whether AXIS is filled in.
+
+        Raises
+        ------
+        ParameterError
+            It is not, but what states its kilometres is.
+        """
+        lone = next((name for name in ("START_KM", "POSTS", "JUMPS") if self.filled(name)), None)
+        if lone and not self.filled("AXIS"):
+            raise ParameterError(f"{lone} needs the line that it applies to: choose AXIS.")
+        return self.filled("AXIS")
+
+    def engine(self) -> str:
+        """Read ENGINE, and check that it is installed and runs on DEVICE."""
+        from ..frpdf.engine import choose_engine
+
+        return choose_engine(self["ENGINE"], self["DEVICE"])
+
+    def weights(self) -> Path | None:
+        """Read METHOD and WEIGHTS: the weights of the network that finds rail points, or None for geometry.
+
+        Raises
+        ------
+        ParameterError, ModelError
+            They contradict each other, or can't be used.
+        """
+        from ..learned.model import weights_for
+
+        return weights_for(self["METHOD"], self["WEIGHTS"])
+
+    def class_codes(self) -> tuple[int, ...]:
+        """Read RAIL_CLASSES."""
+        return class_numbers(self["RAIL_CLASSES"], "RAIL_CLASSES")
+
+    def detects(self) -> bool:
+        """Return whether the points are to tell the rail standard."""
+        return self["STANDARD"] == DETECT
+
+    def standard(self, detected: str | None = None) -> RailStandard:
+        """Read STANDARD, or take the one that was detected; GAUGE and HEAD_WIDTH override its values."""
+        return resolve(detected or self["STANDARD"], self["GAUGE"], self["HEAD_WIDTH"])
+
+    def head_width_m(self) -> float:
+        """Read HEAD_WIDTH, or the value of STANDARD."""
+        head_width_mm = self["HEAD_WIDTH"]
+        if head_width_mm is None and self["STANDARD"] == CUSTOM:
+            raise ParameterError("STANDARD CUSTOM needs the railhead width, in millimetres: fill in HEAD_WIDTH.")
+        return resolve(DEFAULT if head_width_mm else self["STANDARD"], None, head_width_mm).head_width_m
+
+    def other_gauges(self, standard: RailStandard) -> tuple[Gauge, ...]:
+        """Read OTHER_GAUGES, and check that they can be distinguished from each other and from the standard's gauge."""
+        own = self.has("CENTERLINE_TOLERANCE")
+        tolerance_m = self["CENTERLINE_TOLERANCE"] if own else Parameters.centerline_tolerance_m
+        return read_gauges(self["OTHER_GAUGES"] or "", "OTHER_GAUGES", standard, tolerance_m, own)[1:]
+
+    def settings(self, standard: RailStandard, other_gauges: tuple[Gauge, ...] = ()) -> Parameters:
+        """Return the job's parameters for the walk, with the defaults for all others."""
+        given = self._stated({**NUMBERS, **CHOICES})
+        return Parameters(standard.gauge_m, standard.head_width_m, **given).with_gauges(other_gauges)
+
+    def _stated(self, names: Mapping[str, str]) -> dict[str, Any]:
+        """Return the values of those parameters that the job has, by the attribute that each stands for."""
+        return {field: self[name] for name, field in names.items() if self.has(name)}
+
+
+def class_numbers(text: str, what: str) -> tuple[int, ...]:
+    """Parse classes such as "10,11"; `what` is the name of the parameter, for the error.
+
+    Raises
+    ------
+    ParameterError
+        The text is not a list of classes, or is empty.
+    """
+    words = [word for word in re.split(r"[;,\s]+", text) if word]
+    if not words or not all(map(is_class, words)):
+        raise ParameterError(f'{what} "{text}" must be whole numbers from 0 to {LAST_CLASS} such as 10 or 10,11.')
+    return tuple(dict.fromkeys(int(word) for word in words))
