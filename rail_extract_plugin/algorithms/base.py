@@ -47,6 +47,7 @@ from .sentences import COMMAND_LINE, sentence_for
 
 if TYPE_CHECKING:
     from ...core.jobs.result import Rasters
+
 FIGURE_DECIMALS = 3
 """Decimals of the figures of a result: millimetres of lengths in metres, and no more than anybody reads."""
 
