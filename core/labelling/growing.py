@@ -248,11 +248,13 @@ def _report(
 
 def described(growth: Growth, request: Request | None = None) -> str:
     """Say how far rails were followed, why they end and, given the request for the points, where."""
-    first, last = (
-        f"{_place(stop.xyz, request)}, where {stop.reason.value}" if request else f"where {stop.reason.value}"
-        for stop in growth.stops
-    )
     lengths = " and ".join(f"{rail.length_m:.0f} m" for rail in growth.rails)
+    places = [_place(stop.xyz, request) if request else "" for stop in growth.stops]
+    reasons = [stop.reason.value for stop in growth.stops]
+    if len(set(reasons)) == 1:
+        between = f" from {places[0]} to {places[1]}" if request else ""
+        return f"Followed {lengths} of rail{between}: at both ends, {reasons[0]}."
+    first, last = (", ".join(filter(None, (place, f"where {reason}"))) for place, reason in zip(places, reasons))
     return f"Followed {lengths} of rail from {first}, to {last}."
 
 

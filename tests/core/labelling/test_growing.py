@@ -74,7 +74,7 @@ def test_only_the_class_of_points_on_the_rails_changes(tmp_path):
     assert figures.cells_per_m > 30
     assert [stop.reason for stop in result.stops] == [Reason.CLOUD, Reason.CLOUD]
     assert sorted(stop.xyz[0] for stop in result.stops) == pytest.approx([500_003.5, 500_026.5], abs=1.0)
-    assert any("where the cloud ends" in text for text in progress.infos)
+    assert any(text.endswith(": at both ends, the cloud ends.") for text in progress.infos)
 
 
 def test_tiles_give_the_same_points_as_one_file(tmp_path):
