@@ -50,8 +50,8 @@ golden-all: .venv/installed  ## compare every scene with its figures, with the b
 	@PYTHONPATH=$(AS_PACKAGE) $(PYTHON) benchmarks/golden.py --all $(WRITE)
 
 .PHONY: ablation
-ablation: .venv/installed  ## switch rules off one at a time, and print which golden figures need each; RULES=tracks. chooses
-	@PYTHONPATH=$(AS_PACKAGE) $(PYTHON) benchmarks/ablation.py $(RULES)
+ablation: .venv/installed  ## switch rules off one at a time, and print which golden figures need each; RULES=tracks. chooses, WORLDS=200 asks worlds
+	@PYTHONPATH=$(AS_PACKAGE) $(PYTHON) benchmarks/ablation.py $(RULES) $(if $(WORLDS),--worlds $(WORLDS)) $(if $(FROM),--from $(FROM))
 
 .PHONY: worlds
 worlds: .venv/installed  ## extract COUNT=100 worlds drawn at random, from seed FROM=1, raw and classified; SEED=7 draws one

@@ -3,6 +3,10 @@
 Run `python benchmarks/ablation.py [RULE ...] [--scenes SCENE ...] [--variant 'seed 1']`. A rule may be a part of a
 name, as `tracks.`. In a scene in which a rule returns what its replacement returns, whenever it is called, it has no
 effect and is not run again.
+
+`--worlds 200 [--from 1]` asks instead in how many worlds drawn at random each rule decides over failure: each world is
+extracted with all rules and without each of those that act in it, and McNemar's exact test says whether the difference
+is more than chance.
 """
 
 from __future__ import annotations
@@ -12,7 +16,7 @@ import importlib
 import os
 import sys
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, is_dataclass
 from functools import wraps
@@ -36,6 +40,9 @@ from rail_extract.laboratory.ruler.golden import (
     differences,
     figures_of,
 )
+from rail_extract.laboratory.ruler.rates import mcnemar
+from rail_extract.laboratory.ruler.worlds import run
+from rail_extract.laboratory.worlds.world import CLOUDS, make
 
 SHOWN = 3
 """Differences printed for each rule: the largest, by their tolerances."""
@@ -203,12 +210,20 @@ def main() -> None:
     parser.add_argument("--scenes", nargs="+", choices=PLACES, metavar="SCENE", default=PLACES)
     parser.add_argument("--variant", choices=[one.name for one in VARIANTS], default=PLAIN.name, help="model or seed")
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, help="processes (default: one per core)")
+    parser.add_argument("--worlds", type=int, metavar="N", help="worlds of each kind of cloud, in place of scenes")
+    parser.add_argument("--from", type=int, default=1, dest="first", metavar="A", help="first seed of the worlds")
     arguments = parser.parse_args()
     chosen = [
         switch.name
         for switch in SWITCHES
         if any(part in switch.name for part in arguments.rules) or not arguments.rules
     ]
+    if arguments.worlds:
+        seeds = range(arguments.first, arguments.first + arguments.worlds)
+        tasks_of_worlds = [(seed, cloud, chosen) for cloud in CLOUDS for seed in seeds]
+        with processes(arguments.workers) as pool:
+            print(*rows_of_worlds(chosen, pool.map(ablate_world, tasks_of_worlds)), sep="\n")
+        return
     acts: dict[str, int] = defaultdict(int)
     needs: dict[str, list[Difference]] = defaultdict(list)
     with processes(arguments.workers) as pool:
@@ -254,9 +269,7 @@ def ablate(task: tuple[str, Sequence[str], str]) -> dict[str, list[Difference]]:
             before = figures_of(place, scene, variant)
         found = {}
         for switch in (switch for switch in chosen if switch.name in effective):
-            with ExitStack() as stack:
-                for module, attribute, value in switch.off:
-                    stack.enter_context(patch.object(_module(module), attribute, value))
+            with _without(switch):
                 try:
                     now = figures_of(place, scene, variant)
                 except Exception as error:  # noqa: BLE001 - whatever happens without a rule is its effect
@@ -264,6 +277,47 @@ def ablate(task: tuple[str, Sequence[str], str]) -> dict[str, list[Difference]]:
                     now = {}
             found[switch.name] = differences(place, before, now, tolerances)
     return found
+
+
+Outcome = tuple[bool, dict[str, bool]]
+"""Whether a world fails with all rules, and without each of those that act in it."""
+
+
+def ablate_world(task: tuple[int, str, Sequence[str]]) -> Outcome:
+    """Extract a world with all rules, and without each of those that have an effect in it."""
+    seed, cloud, names = task
+    world = make(seed, cloud)
+    chosen = [switch for switch in SWITCHES if switch.name in names]
+    effective: set[str] = set()
+    with _watched(chosen, effective):
+        before = bool(run(world).faults)
+    without = {}
+    for switch in (switch for switch in chosen if switch.name in effective):
+        with _without(switch):
+            without[switch.name] = bool(run(world).faults)
+    print(f"{cloud} world {seed}: {'fails' if before else 'right'}", file=sys.stderr, flush=True)
+    return before, without
+
+
+def rows_of_worlds(names: Sequence[str], outcomes: Iterable[Outcome]) -> Iterator[str]:
+    """Yield the table of rules: worlds that fail without each alone, and with it alone, and McNemar's chance."""
+    known = list(outcomes)
+    yield f"{len(known)} worlds, {sum(before for before, _ in known)} fail with all rules."
+    yield "| rule | acts in | fail without it alone | fail with it alone | chance |\n|---|---|---|---|---|"
+    for name in names:
+        after = [without.get(name, before) for before, without in known]
+        acts = sum(name in without for _, without in known)
+        worse, better, chance = mcnemar(after, [before for before, _ in known])
+        yield f"| `{name}` | {acts} | {worse} | {better} | {chance:.3f} |"
+
+
+@contextmanager
+def _without(switch: Switch) -> Iterator[None]:
+    """Switch a rule off."""
+    with ExitStack() as stack:
+        for module, attribute, value in switch.off:
+            stack.enter_context(patch.object(_module(module), attribute, value))
+        yield
 
 
 @contextmanager

@@ -58,12 +58,12 @@ class Kind:
         return self.low <= value <= self.high and (self.zero or value != 0.0)
 
 
-NUMBER = Kind(-MAX_PLACE_M, MAX_PLACE_M, f"numbers of a design are between {-MAX_PLACE_M:g} and {MAX_PLACE_M:g}")
+NUMBER = Kind(-MAX_PLACE_M, MAX_PLACE_M, f"numbers of a design are between {-MAX_PLACE_M:,.0f} and {MAX_PLACE_M:,.0f}")
 WHOLE = Kind(-(2**31), 2**31 - 1, f"whole numbers are between {-(2**31)} and {2**31 - 1}")
-KM = Kind(-MAX_KM, MAX_KM, f"kilometres are between {-MAX_KM:g} and {MAX_KM:g}")
+KM = Kind(-MAX_KM, MAX_KM, f"kilometres are between {-MAX_KM:,.0f} and {MAX_KM:,.0f}")
 LENGTH = Kind(0.0, MAX_LENGTH_M, f"lengths are above 0 and up to {MAX_LENGTH_M / 1000:,.0f} km", zero=False)
 RADIUS = Kind(
-    -MAX_PLACE_M, MAX_PLACE_M, f"radii are up to {MAX_PLACE_M:g} m and never 0, and a straight has none", zero=False
+    -MAX_PLACE_M, MAX_PLACE_M, f"radii are up to {MAX_PLACE_M:,.0f} m and never 0, and a straight has none", zero=False
 )
 GRADE = Kind(-MAX_GRADE, MAX_GRADE, f"gradients are up to {1000 * MAX_GRADE:g} per mille")
 GRADE_PM = Kind(1000 * GRADE.low, 1000 * GRADE.high, GRADE.says)

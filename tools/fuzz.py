@@ -30,7 +30,7 @@ from fuzzing.kinds import KINDS, Kind
 MAX_BYTES = 2**30
 """Memory that reading a file may take in addition to that of Python and its libraries."""
 
-MAX_CPU_S, MAX_WALL_S = 30.0, 600.0
+MAX_CPU_S, MAX_WALL_S = 20.0, 600.0
 """A file that takes longer hangs. The wall clock has a wide limit, because the machine may be shared."""
 
 SCRIPT = Path(__file__).resolve()

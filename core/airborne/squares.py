@@ -58,7 +58,7 @@ def pieces_by_square(axes: Sequence[Polyline]) -> dict[Key, tuple[Piece, ...]]:
     for number, axis in enumerate(axes):
         for key, first_m, last_m in _stays(axis):
             low_m = max(np.floor((first_m - MARGIN_M) / STATION_M) * STATION_M, 0.0)
-            inside = (axis.t >= low_m) & (axis.t <= last_m + MARGIN_M)
+            inside = slice(*np.searchsorted(axis.t, [low_m, np.nextafter(last_m + MARGIN_M, np.inf)]))
             around = Polyline(axis.xy[inside], axis.t[inside])
             found.setdefault(key, []).append(Piece(number, around, first_m, last_m))
     return {key: tuple(pieces) for key, pieces in sorted(found.items())}

@@ -5,7 +5,7 @@ See docs/stationing.md.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -158,12 +158,21 @@ class Axis:
     def _away(self, segment: np.ndarray, share: np.ndarray, xy: np.ndarray) -> np.ndarray:
         return np.linalg.norm(xy - self._place(segment, share), axis=1)
 
-    def ambiguous(self, xy: np.ndarray, feet: Feet) -> np.ndarray:
-        """Return whether places, (k, 2), have a second foot that may as well be meant, (k,) bool."""
+    @cached_property
+    def _box(self) -> np.ndarray:
+        """Smallest and largest coordinates, (2, 2)."""
+        return np.array([self.xy.min(axis=0), self.xy.max(axis=0)])
+
+    def farther_than(self, xy: np.ndarray) -> np.ndarray:
+        """Return the distance of places, (k, 2), from the bounding box, (k,): the axis is not closer."""
+        return np.hypot(*np.maximum(np.maximum(self._box[0] - xy, xy - self._box[1]), 0.0).T)
+
+    def ambiguous(self, xy: np.ndarray, s: np.ndarray, distance_m: np.ndarray) -> np.ndarray:
+        """Return whether places, (k, 2), have a second foot that may as well be meant as those at `s`, (k,) bool."""
         tree, _ = self._samples
-        reach = CLEARLY * feet.distance_m
+        reach = CLEARLY * distance_m
         near = tree.query_ball_point(xy, np.hypot(reach, SAMPLE_M / 2), return_sorted=True)
-        places = zip(xy, feet.s, reach, near)
+        places = zip(xy, s, reach, near)
         return np.array([self._has_second(place, foot, at, np.array(ids)) for place, foot, at, ids in places], bool)
 
     def _has_second(self, place: np.ndarray, foot: float, reach_m: float, ids: np.ndarray) -> bool:
@@ -198,13 +207,13 @@ def locate(axes: Sequence[Axis], xy: np.ndarray, notation: str, progress: Progre
         Places further than `BEYOND_M` beyond the ends of all axes have none.
     """
     parts = range(0, len(xy), PLACES_AT_ONCE)
-    found = [_locate(axes, xy[start : start + PLACES_AT_ONCE]) for start in progress.follow(parts)]
+    found = [_locate(axes, xy[start : start + PLACES_AT_ONCE], progress) for start in progress.follow(parts)]
     if not found:
         return Kilometres.empty(0)
     axis, s, left_m, ambiguous = (np.concatenate(column) for column in zip(*found))
     made = Kilometres.empty(len(xy))
-    for number, one in enumerate(axes):
-        mine = np.flatnonzero(axis == number)
+    for number, mine in _groups(axis):
+        one = axes[number]
         piece, km = one.stationing.at(s[mine])
         counts_from = one.stationing.counts_from()[piece]
         made.axis[mine], made.piece[mine], made.km[mine] = one.name, piece + 1, km
@@ -214,15 +223,72 @@ def locate(axes: Sequence[Axis], xy: np.ndarray, notation: str, progress: Progre
     return made
 
 
-def _locate(axes: Sequence[Axis], xy: np.ndarray) -> tuple[np.ndarray, ...]:
+def _locate(axes: Sequence[Axis], xy: np.ndarray, progress: Progress) -> tuple[np.ndarray, ...]:
     """Return the number of the nearest axis (-1 without one), `s`, the offset and whether they are ambiguous."""
-    feet = [one.feet(xy) for one in axes]
-    distance = np.stack([np.where(one.beyond_m <= BEYOND_M, one.distance_m, np.inf) for one in feet])
-    nearest, rows = np.argmin(distance, axis=0), np.arange(len(xy))
-    shortest = distance[nearest, rows]
-    ambiguous = np.sum(distance < CLEARLY * shortest, axis=0) > 1
-    for number, (one, own) in enumerate(zip(axes, feet)):
-        mine = np.flatnonzero((nearest == number) & ~ambiguous & np.isfinite(shortest))
-        ambiguous[mine] = one.ambiguous(xy[mine], Feet(own.s[mine], own.left_m[mine], own.beyond_m[mine]))
-    s, left_m = (np.stack([getattr(one, name) for one in feet])[nearest, rows] for name in ("s", "left_m"))
-    return np.where(np.isfinite(shortest), nearest, -1), s, left_m, ambiguous
+    near = nearest(axes, xy, BEYOND_M, progress)
+    ambiguous = near.second_m < CLEARLY * near.distance_m
+    for number, mine in _groups(np.where(ambiguous, -1, near.axis)):
+        progress.check()
+        ambiguous[mine] = axes[number].ambiguous(xy[mine], near.s[mine], near.distance_m[mine])
+    return near.axis, near.s, near.left_m, ambiguous
+
+
+def _groups(axis: np.ndarray) -> Iterator[tuple[int, np.ndarray]]:
+    """Yield the number of each axis that places have, and the numbers of these places; -1 is none."""
+    order = np.argsort(axis, kind="stable")
+    for mine in np.split(order, np.flatnonzero(np.diff(axis[order])) + 1):
+        if len(mine) and axis[mine[0]] >= 0:
+            yield int(axis[mine[0]]), mine
+
+
+@dataclass(frozen=True)
+class Nearest:
+    """The nearest axis of places; (n,) arrays.
+
+    Attributes
+    ----------
+    axis : int
+        Its number; -1 without one.
+    s, left_m, distance_m : float
+        See `Feet`.
+    second_m : float
+        Distance of the axis that is the nearest but one; infinity without one, or where it is clearly farther away.
+    """
+
+    axis: np.ndarray
+    s: np.ndarray
+    left_m: np.ndarray
+    distance_m: np.ndarray
+    second_m: np.ndarray
+
+    def put(self, number: int, mine: np.ndarray, feet: Feet, beyond_m: float) -> None:
+        """Take note of the feet of some places on an axis."""
+        distance_m, known_m = np.where(feet.beyond_m <= beyond_m, feet.distance_m, np.inf), self.distance_m[mine]
+        closer = distance_m < known_m
+        self.second_m[mine] = np.where(closer, known_m, np.minimum(self.second_m[mine], distance_m))
+        own = mine[closer]
+        self.axis[own] = number
+        self.s[own], self.left_m[own], self.distance_m[own] = feet.s[closer], feet.left_m[closer], distance_m[closer]
+
+
+def nearest(axes: Sequence[Axis], xy: np.ndarray, beyond_m: float, progress: Progress = SILENT) -> Nearest:
+    """Find the nearest axis of places, (n, 2) metres, of those beyond whose ends they are by less than `beyond_m`.
+
+    Of many axes, only those are looked at whose bounding box is not clearly farther away than an axis.
+    """
+    infinite = np.full(len(xy), np.inf)
+    found = Nearest(np.full(len(xy), -1), np.zeros(len(xy)), np.zeros(len(xy)), infinite, infinite.copy())
+    first, closest_m = np.zeros(len(xy), dtype=int), infinite.copy()
+    for number, axis in enumerate(axes):
+        bound_m = axis.farther_than(xy)
+        first[bound_m < closest_m] = number
+        closest_m = np.minimum(closest_m, bound_m)
+    for number, mine in _groups(first):
+        progress.check()
+        found.put(number, mine, axes[number].feet(xy[mine]), beyond_m)
+    for number, axis in enumerate(axes):
+        progress.check()
+        mine = np.flatnonzero((first != number) & (axis.farther_than(xy) <= CLEARLY * found.distance_m))
+        if len(mine):
+            found.put(number, mine, axis.feet(xy[mine]), beyond_m)
+    return found

@@ -11,6 +11,7 @@ from typing import Optional
 import numpy as np
 
 from ..errors import ParameterError
+from ..progress import SILENT, Progress
 from .elements import Alignment, Element, PlanElement, VerticalElement
 
 MAX_GAP_M = 0.001
@@ -64,7 +65,7 @@ def names(alignments: Sequence[Alignment]) -> list[str]:
     return list(made)
 
 
-def check_joined(alignment: Alignment) -> None:
+def check_joined(alignment: Alignment, progress: Progress = SILENT) -> None:
     """Check that each element of an alignment begins where the one before it ends.
 
     Raises
@@ -75,6 +76,7 @@ def check_joined(alignment: Alignment) -> None:
     layouts: tuple[Sequence[Element], ...] = alignment.plan, alignment.vertical, alignment.cant
     for elements in layouts:
         for number, (one, after) in enumerate(zip(elements, elements[1:]), start=1):
+            progress.check()
             gap_m = _gap_m(alignment, one, after)
             if gap_m > MAX_GAP_M:
                 raise ParameterError(

@@ -10,7 +10,7 @@ import math
 import xml.etree.ElementTree as ET  # nosec B405 - files with a DOCTYPE are refused before any entity is read
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Optional
+from typing import Any, Optional
 
 import numpy as np
 
@@ -74,7 +74,7 @@ class Part:
         return math.dist(self.start, self.end)
 
 
-def parts_of(node: ET.Element, name: str) -> list[Part]:
+def parts_of(node: ET.Element, name: str, progress: Progress) -> list[Part]:
     """Return the plan elements of an alignment.
 
     Parameters
@@ -83,6 +83,7 @@ def parts_of(node: ET.Element, name: str) -> list[Part]:
         The alignment.
     name : str
         Its name in messages.
+    progress : Progress
 
     Raises
     ------
@@ -91,6 +92,7 @@ def parts_of(node: ET.Element, name: str) -> list[Part]:
     readers = {"Line": _line, "Curve": _curve, "Spiral": _spiral}
     found = []
     for number, child in enumerate((one for one in node.iterfind("CoordGeom/*") if one.tag != "Feature"), start=1):
+        progress.check()
         where = f"{child.tag} {number} of {name}"
         if child.tag not in readers:
             raise AlignmentFileError(f"The {where} is neither line, arc nor clothoid: export an alignment of these.")
@@ -125,6 +127,7 @@ def placed(parts: Sequence[Part], frame: LocalFrame, east_first: bool, progress:
     made: list[PlanElement] = []
     s, widest_m = 0.0, 0.0
     for before, part in zip([None, *parts], parts):
+        progress.check()
         if before is not None:
             gap_m = float(np.hypot(*(part.start - before.end)))
             widest_m = max(widest_m, gap_m)
@@ -339,14 +342,18 @@ def stations_of_file(node: ET.Element, name: str) -> Stations:
     return Stations(tuple(pieces))
 
 
-def with_kilometres(alignment: Alignment, stations: Stations) -> Alignment:
+def with_kilometres(alignment: Alignment, stations: Stations, progress: Progress) -> Alignment:
     """Return an alignment with the kilometres of the ends of all its elements."""
-    return replace(
-        alignment,
-        plan=tuple(replace(one, figures=_kilometres(one, stations)) for one in alignment.plan),
-        vertical=tuple(replace(one, figures=_kilometres(one, stations)) for one in alignment.vertical),
-        cant=tuple(replace(one, figures=_kilometres(one, stations)) for one in alignment.cant),
-    )
+
+    def numbered(elements: Sequence[Any]) -> tuple[Any, ...]:
+        made = []
+        for one in elements:
+            progress.check()
+            made.append(replace(one, figures=_kilometres(one, stations)))
+        return tuple(made)
+
+    vertical, cant = numbered(alignment.vertical), numbered(alignment.cant)
+    return replace(alignment, plan=numbered(alignment.plan), vertical=vertical, cant=cant)
 
 
 def _kilometres(one: Element, stations: Stations) -> Figures:

@@ -68,7 +68,7 @@ def read_landxml(path: Path, east_first: bool = False, progress: Progress = SILE
             f"{path.name} has no alignment with a CoordGeom: export the alignments from the design program, too."
         )
     wheres = [f"alignment {node.get('name', '')[:60] or number} of {path.name}" for number, node in enumerate(drawn, 1)]
-    plans = [parts_of(node, where) for node, where in zip(drawn, wheres)]
+    plans = [parts_of(node, where, progress) for node, where in zip(drawn, wheres)]
     _check_turns(path.name, [part for plan in plans for part in plan], east_first)
     start = plans[0][0].start if east_first else plans[0][0].start[::-1]
     frame = LocalFrame(np.append(np.round(start / ORIGIN_STEP) * ORIGIN_STEP, 0.0))
@@ -104,7 +104,7 @@ def _alignment(
     stations = stations_of_file(node, where)
     profile, cant = profile_of(node, where, progress), cant_of(node, where, progress)
     made = Alignment(track_id, frame, plan, profile, cant, node.get("name", ""))
-    return with_kilometres(within_plan(made, where, progress, float(node.get("staStart", "0"))), stations)
+    return with_kilometres(within_plan(made, where, progress, float(node.get("staStart", "0"))), stations, progress)
 
 
 def _track_ids(nodes: Sequence[ET.Element]) -> list[int]:

@@ -155,7 +155,7 @@ def km_of(value: object, field: str, name: str, feature: int) -> float:
     km = read_km(value) if isinstance(value, str) else number_in(value)
     if km is not None and KM.holds(km):
         return km
+    what = "is empty" if value is None else f"is {quoted(value)} and no kilometre"
     raise RailExtractError(
-        f"{name} has a row (feature {feature}) whose field {field} is {quoted(value)} and no kilometre: correct it, or "
-        "delete the row."
+        f"{name} has a row (feature {feature}) whose field {field} {what}: correct it, or delete the row."
     )

@@ -78,12 +78,12 @@ class Stationing:
 
         Beyond the first and the last knot they are those of the nearer one.
         """
-        piece = np.maximum(np.searchsorted(self.s[self.starts], s, side="right") - 1, 0)
-        km = np.empty(len(s))
-        for number in np.unique(piece):
-            mine, knots = piece == number, self.piece == number
-            km[mine] = np.interp(s[mine], self.s[knots], self.km[knots])
-        return piece, km
+        knot = np.maximum(np.searchsorted(self.s, s, side="right") - 1, 0)
+        after = np.minimum(knot + 1, len(self.s) - 1)
+        after = np.where(self.piece[after] == self.piece[knot], after, knot)
+        length_m = self.s[after] - self.s[knot]
+        share = np.clip(s - self.s[knot], 0.0, length_m) / np.where(length_m > 0, length_m, 1.0)
+        return self.piece[knot], self.km[knot] + share * (self.km[after] - self.km[knot])
 
     def places(self, km: float) -> list[tuple[int, float]]:
         """Return piece and place, metres, of a kilometre: none in a gap, two where it is twice."""

@@ -16,7 +16,7 @@ from ..design_numbers import KM, LENGTH, NUMBER, checked
 from ..design_places import check_places
 from ..errors import RailExtractError
 from ..polyline import Polyline
-from .axis import Axis
+from .axis import Axis, nearest
 from .stationing import Jump, Stationing, stationing_of
 
 POST_OFFSET_M = 50.0
@@ -206,21 +206,19 @@ def _by_measures(line: AxisLine) -> Axis:
 
 def _by_posts(lines: Sequence[AxisLine], posts: Sequence[Post], jumps: Sequence[Jump]) -> Axes:
     """Give lines their kilometres by the posts that are nearest to each."""
-    km = np.array([post.km for post in posts])
+    km, xy = np.array([post.km for post in posts]), np.array([post.xy for post in posts])
     plain = [Axis(line.name, _directed(line, False).xy, Stationing(*np.zeros((3, 1)))) for line in lines]
-    feet = [one.feet(np.array([post.xy for post in posts])) for one in plain]
-    distance = np.stack([one.distance_m for one in feet])
-    nearest = np.argmin(distance, axis=0)
-    far = distance.min(axis=0) > POST_OFFSET_M
+    near = nearest(plain, xy, np.inf)
+    far = near.distance_m > POST_OFFSET_M
     made = []
-    for number, (axis, own) in enumerate(zip(plain, feet)):
-        mine = np.flatnonzero((nearest == number) & ~far)
+    for number, axis in enumerate(plain):
+        mine = np.flatnonzero((near.axis == number) & ~far)
         if not len(mine):
             raise RailExtractError(
                 f"No post is within {POST_OFFSET_M:g} m of the axis {axis.name}: check POSTS and their "
                 "coordinate system."
             )
-        made.append(_numbered(axis, own.s[mine], km[mine], jumps))
+        made.append(_numbered(axis, near.s[mine], km[mine], jumps))
     count = int(far.sum())
     left_out = f"{count} of {len(posts)} posts are more than {POST_OFFSET_M:g} m from AXIS: left out."
     return _told(made, [left_out] if count else [])

@@ -118,16 +118,17 @@ def frame_of(table: Iterable[Row], system: tuple[Optional[str], float, float], s
     return LocalFrame(origin, horizontal_unit_m, vertical_unit_m, crs_wkt)
 
 
-def rows(alignment: Alignment) -> list[dict[str, Any]]:
+def rows(alignment: Alignment, progress: Progress = SILENT) -> list[dict[str, Any]]:
     """Return the rows of an alignment, unrounded: plan, then height, then cant, in order along the track."""
     layouts: tuple[Sequence[Element], ...] = (alignment.plan, alignment.vertical, alignment.cant)
     starts = np.array([one.s_from for one in alignment.elements])
     places, headings = alignment.frame.to_crs(alignment.xyz(starts)), alignment.headings(starts)
     numbered = [(number, one) for elements in layouts for number, one in enumerate(elements, 1)]
-    return [
-        _row(alignment.track_id, number, one, place, heading)
-        for (number, one), place, heading in zip(numbered, places, headings.tolist())
-    ]
+    made = []
+    for (number, one), place, heading in zip(numbered, places, headings.tolist()):
+        progress.check()
+        made.append(_row(alignment.track_id, number, one, place, heading))
+    return made
 
 
 def alignments(table: Iterable[Row], frame: LocalFrame, progress: Progress = SILENT) -> list[Alignment]:

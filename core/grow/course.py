@@ -97,8 +97,10 @@ def _grade(z: np.ndarray, along: np.ndarray) -> tuple[float, float]:
 def smoothed(xyz: np.ndarray, along_m: np.ndarray, reach_m: float, seen: np.ndarray) -> np.ndarray:
     """Fit a parabola through the places within `reach_m` of each one that were seen, (n, 3); the others as they are."""
     result = xyz.copy()
+    firsts = np.searchsorted(along_m, along_m - reach_m)
+    lasts = np.searchsorted(along_m, along_m + reach_m, side="right")
     for number, place_m in enumerate(along_m):
-        near = (np.abs(along_m - place_m) <= reach_m) & seen
-        if near.sum() > 3 and seen[number]:
+        near = firsts[number] + np.flatnonzero(seen[firsts[number] : lasts[number]])
+        if len(near) > 3 and seen[number]:
             result[number] = np.polyfit(along_m[near] - place_m, xyz[near] - xyz[number], 2)[-1] + xyz[number]
     return result

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import Optional
@@ -19,6 +20,10 @@ LEAST_SHARE = 0.25
 
 HALF = 0.5
 """Least share in the last window of a rail."""
+
+COURSE = 2.0
+"""Length of rail behind a window that may show its course, in lengths over which a course is fitted: a curve is longer
+than its chord."""
 
 MEMORY = 8
 """Windows whose median gives the number of points that a head has."""
@@ -121,8 +126,9 @@ def follow(
     windows: list[Window] = []
     heading, places = start.heading, list(behind)
     reason = Reason.LENGTH
+    shown = math.ceil(COURSE * start.beam.fit_m / parameters.window_m) + len(behind)
     for _ in progress.follow(range(int(parameters.max_length_m / parameters.window_m))):
-        ahead = lead(np.array(places), parameters.window_m, heading, start.beam)
+        ahead = lead(np.array(places[-shown:]), parameters.window_m, heading, start.beam)
         window = walk.see(ahead)
         if window is None or walk.track.unseen > parameters.max_outliers:
             reason = walk.failure(ahead) if window else Reason.CHOICE

@@ -64,8 +64,11 @@ def grow(points: OnHeads, seed: np.ndarray, settings: GrowSettings, progress: Pr
         None if the seed is not on a rail.
     """
     start = find_start(points, seed, settings)
-    if start is None:
-        return None
+    return None if start is None else grow_from(points, start, settings, progress)
+
+
+def grow_from(points: OnHeads, start: Start, settings: GrowSettings, progress: Progress = SILENT) -> Growth | None:
+    """Follow a rail that was found at a seed to both sides; see `grow`."""
     ahead, back = progress.split(2)
     onwards, last = follow(points, start, start.xyz, settings, ahead)
     # The way back begins beyond the seed, so that both rails are measured there.

@@ -153,12 +153,14 @@ class OnHeads:
 
     def on(self, rails: Sequence[Rail]) -> Iterator[tuple[Key, np.ndarray]]:
         """Yield the squares in which points lie on rails, and the numbers of these points as they are read."""
+        boxes = np.array([(rail.xyz.min(axis=0), rail.xyz.max(axis=0)) for rail in rails]).reshape(-1, 2, 3)[..., :2]
         for key in sorted(self._squares):
             xyz = self._read(key)
             corner = np.multiply(key, self._own.side_m)
             own = np.flatnonzero(self._own.own(xyz[:, :2] - corner))
             on = np.zeros(len(xyz), dtype=bool)
-            for rail in rails:
+            near = (boxes[:, 0] <= corner + 2 * self._own.side_m) & (boxes[:, 1] >= corner - self._own.side_m)
+            for rail in (rails[at] for at in np.flatnonzero(near.all(axis=1)).tolist()):
                 on[own[self._level_with(rail, xyz[own], self._squares[key])]] = True
                 if rail.beam is not THIN:  # whose points beside the head are labelled as well
                     on[self._squares[key].number[self._along(rail, self._squares[key].xyz).point]] = True

@@ -64,6 +64,11 @@ class Start:
     side: int
     level_m: float
 
+    @property
+    def middle(self) -> np.ndarray:
+        """Place on its axis at the seed, (2,)."""
+        return self.xyz[:, :2].mean(axis=0)
+
 
 def window_m(per_m: float, settings: GrowSettings) -> float:
     """Return the length of a window on a rail with this number of points per metre."""

@@ -88,7 +88,11 @@ class Number(Parameter):
     @property
     def accepted(self) -> str:
         """See `Parameter`."""
-        return f"{self.low:g} or more" if self.high == UNBOUNDED else f"a number from {self.low:g} to {self.high:g}"
+        return (
+            f"{self.low:g} or more"
+            if self.high == UNBOUNDED
+            else f"a number from {self.low:,.10g} to {self.high:,.10g}"
+        )
 
 
 @dataclass(frozen=True)

@@ -41,7 +41,7 @@ def _check(values: Values) -> None:
 
 def _run(values: Values, progress: Progress) -> Result:
     """Read the table, check it and write the file."""
-    from ..output.design_files import check_designs, write_designs
+    from ..output.design_files import check_designs, left_out, write_designs
     from .reading import read_elements
     from .result import Result
 
@@ -52,7 +52,8 @@ def _run(values: Values, progress: Progress) -> Result:
         write_designs(new, alignments, values.standard(), circles, VERSION, progress.span(CHECKED, 1))
     count = sum(len(alignment.elements) for alignment in alignments)
     figures = {"OUTPUT": str(destination.path), "ALIGNMENT_COUNT": len(alignments), "ELEMENT_COUNT": count}
-    return Result(figures, alignments[0].frame, sentences=(f"{len(alignments)} alignments, {count} elements",))
+    said = f"{len(alignments)} alignments, {count} elements"
+    return Result(figures, alignments[0].frame, sentences=(said, left_out(destination.path, alignments)))
 
 
 JOB = Job(

@@ -25,6 +25,7 @@ from .declaration import (
 )
 
 if TYPE_CHECKING:
+    from ..alignment.deviations import Deviations
     from ..alignment.fit import Fit
     from ..progress import Progress
     from .result import Result
@@ -36,16 +37,25 @@ READING, FITTING = 0.1, 0.95
 MIN_FIT_TOLERANCE_MM, MAX_ELEMENT_M = 0.1, 1000.0
 """No scanner resolves a smaller tolerance, and no element that is left out on purpose is longer."""
 
+DIRECTIONS = {
+    "RMS": ("slew_mm", "across"),
+    "LIFT_RMS": ("lift_mm", "in height"),
+    "CANT_RMS": ("cant_diff_mm", "of cant"),
+}
+"""Attributes of the deviations by the figures that sum them up, and their directions in words."""
+
 
 def _run(values: Values, progress: Progress) -> Result:
     """Fit each track."""
     from ..alignment.fit import fit_tracks
     from ..fields import DEVIATIONS
     from ..output.layers import elements_layer, stations_layer
+    from ..progress import Recording
     from ..report import build_alignment_page
     from .reading import read_elements, read_tracks
     from .result import Result
 
+    progress = Recording(progress)
     tracks, frame = read_tracks(values, "INPUT", progress.span(0, READING))
     held = read_elements(values, "FIXED", frame.crs_wkt) if values.filled("FIXED") else []
     settings = FitParameters(values["TOLERANCE"] / 1000.0, values["MIN_LENGTH"], values["TRANSITIONS"], values["ROUND"])
@@ -59,21 +69,35 @@ def _run(values: Values, progress: Progress) -> Result:
             "ELEMENTS": lambda: elements_layer(alignments, progress),
             "DEVIATIONS": lambda: stations_layer(DEVIATIONS, deviations),
         },
-        {"REPORT": lambda: build_alignment_page(courses, values.title("INPUT"), facts, True)},
+        {"REPORT": lambda: build_alignment_page(courses, values.title("INPUT"), facts, True, progress.warnings)},
         tuple(
-            f"Track {one.alignment.track_id}: {len(one.alignment.elements)} elements, root mean square "
-            f"{one.rms_mm:.2f} mm"
+            f"Track {one.alignment.track_id}: {len(one.alignment.elements)} elements; root mean square "
+            f"{_in_words(one.deviations)}"
             for one in fits
         ),
     )
 
 
 def _figures(fits: Sequence[Fit]) -> dict[str, Any]:
-    """Return the number of elements, and the root mean square of the slews in millimetres."""
-    squares = sum(float((fit.deviations.slew_mm**2).sum()) for fit in fits)
-    count = sum(len(fit.deviations.s) for fit in fits)
-    elements = sum(len(fit.alignment.elements) for fit in fits)
-    return {"ELEMENT_COUNT": elements, "RMS": round(math.sqrt(squares / count), 3)}
+    """Return the number of elements, and the root mean squares of slews, lifts and differences of cant, millimetres."""
+    import numpy as np
+
+    from ..report.markup import rms
+
+    found = {
+        figure: rms(np.concatenate([getattr(fit.deviations, name) for fit in fits]))
+        for figure, (name, _) in DIRECTIONS.items()
+    }
+    rounded = {figure: None if math.isnan(one) else round(one, 3) for figure, one in found.items()}
+    return {"ELEMENT_COUNT": sum(len(fit.alignment.elements) for fit in fits), **rounded}
+
+
+def _in_words(deviations: Deviations) -> str:
+    """Return the root mean squares of a track, each with its direction; unknown ones are left out."""
+    from ..report.markup import rms
+
+    found = ((rms(getattr(deviations, name)), where) for name, where in DIRECTIONS.values())
+    return ", ".join(f"{one:.2f} mm {where}" for one, where in found if not math.isnan(one))
 
 
 JOB = Job(
@@ -149,7 +173,12 @@ JOB = Job(
         ),
     ),
     (shared.ELEMENTS_OUTPUT, shared.DEVIATIONS_OUTPUT, shared.ALIGNMENT_REPORT),
-    (Figure("ELEMENT_COUNT", "Number of elements"), Figure("RMS", "Root mean square of the slews [mm]")),
+    (
+        Figure("ELEMENT_COUNT", "Number of elements"),
+        Figure("RMS", "Root mean square of the slews [mm]"),
+        Figure("LIFT_RMS", "Root mean square of the lifts [mm]"),
+        Figure("CANT_RMS", "Root mean square of the differences of cant [mm]"),
+    ),
     ALIGNMENT,
     picture="alignment.svg",
     guide="alignment",

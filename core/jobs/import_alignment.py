@@ -65,10 +65,11 @@ def _run(values: Values, progress: Progress) -> Result:
     from ..fields import DEVIATIONS
     from ..output.design_files import check_place
     from ..output.layers import axes_layer, elements_layer, stations_layer
+    from ..progress import Recording
     from ..report import build_alignment_page
     from .result import Result
 
-    path = values["INPUT"]
+    progress, path = Recording(progress), values["INPUT"]
     read = read_landxml(path, values["EAST_FIRST"], progress.span(0, READING))
     frame = replace(read[0].frame, crs_wkt=_system(values))
     alignments = [replace(one, frame=frame) for one in read]
@@ -80,7 +81,7 @@ def _run(values: Values, progress: Progress) -> Result:
     pages = {}
     if values.filled("TRACKS"):
         layers["DEVIATIONS"] = lambda: stations_layer(DEVIATIONS, [one for _, one in courses])
-        pages["REPORT"] = lambda: build_alignment_page(courses, values.title("TRACKS"), facts, False)
+        pages["REPORT"] = lambda: build_alignment_page(courses, values.title("TRACKS"), facts, False, progress.warnings)
     return Result(
         {"ALIGNMENT_COUNT": len(alignments), "ELEMENT_COUNT": count},
         frame,

@@ -5,7 +5,7 @@ Only points within reach of the seeds are read; the squares that a rail runs thr
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
@@ -17,8 +17,9 @@ from ..classify.guide import Guide
 from ..clouds.points import Request
 from ..disk import writing
 from ..errors import OffCloudError, OffRailError
-from ..grow.growth import Growth, Stop, grow
+from ..grow.growth import Growth, Stop
 from ..grow.heads import OnHeads
+from ..grow.seeds import Growths
 from ..grow.settings import GrowSettings
 from ..polyline import Polyline
 from ..progress import SILENT, Progress
@@ -98,26 +99,26 @@ def grow_points(
     folder: Path,
     keep: Callable[[np.ndarray], None],
     progress: Progress = SILENT,
-) -> tuple[list[Growth], SearchFigures]:
+) -> tuple[Growths, SearchFigures]:
     """Follow rails from seeds, and hand the points on them, (n,) `finding.POINT`, to `keep` by squares.
 
     The other parameters, and errors, are those of `grow_files`.
     """
     finding, labelling = progress.divide((6.0, 1.0))
     cloud, growths = grow_all(request, seeds, settings, folder, finding)
-    figures = _lengths(growths)
-    rails = [rail for growth in growths for rail in growth.rails]
+    figures = _lengths(growths.grown)
+    rails = [rail for growth in growths.grown for rail in growth.rails]
     for key, numbers in labelling.follow(list(cloud.heads.on(rails))):
         points = cloud.read(key)[numbers]
         keep(points)
         figures += _figures(request.zero.to_local(points["xyz"]), settings)
-    _report(growths, figures, settings, request, progress)
+    _report(growths.grown, figures, settings, request, progress)
     return growths, figures
 
 
 def grow_all(
     request: Request, seeds: Sequence[np.ndarray], settings: GrowSettings, folder: Path, progress: Progress = SILENT
-) -> tuple[Cloud, list[Growth]]:
+) -> tuple[Cloud, Growths]:
     """Follow rails from seeds; returns the points that were read, and what grew, in metres.
 
     Parameters and errors are those of `grow_files`.
@@ -125,37 +126,24 @@ def grow_all(
     reading, growing = progress.divide((1.0, 1.0))
     local = [request.zero.to_local(np.column_stack([seed[:, :2], np.zeros(len(seed))]))[:, :2] for seed in seeds]
     places = [Polyline(seed).resampled(LINE_STEP_M).xyz if len(seed) > 1 else seed for seed in local]
-    _check_seeds(request, np.concatenate(places))
+    places = _in_cloud(request, places)
     request.announce(progress)
     cloud = Cloud(request, np.concatenate(places), settings, folder, reading)
     progress.status("Following the rails")
-    growths: list[Growth] = []
-    missed = 0
-    for seed, share in zip(places, growing.split(len(places))):
-        grown = list(_grow_along(cloud.heads, seed, settings, share))
-        growths += grown
-        missed += not grown
+    growths = Growths(cloud.heads, settings)
+    # From both ends of a line, and from those of its places that no rail has reached.
+    is_on = [growths.add((*seed[:1], *seed[:0:-1]), share) for seed, share in zip(places, growing.split(len(places)))]
+    growths.reach_on(progress)
     parameters = settings.parameters
-    if not growths:
+    if not growths.grown:
         raise OffRailError(
             f"No seed is on a rail: put seeds within {parameters.search_m:g} m of railheads that stand "
             f"{parameters.min_height_m:g} m above the bed, and check the rail standard and the unit of the coordinates."
         )
+    missed = is_on.count(False)
     if missed:
         progress.warning(f"{missed} of {len(places)} seeds are not on a rail: move them onto railheads.")
     return cloud, growths
-
-
-def _grow_along(heads: OnHeads, places: np.ndarray, settings: GrowSettings, progress: Progress) -> Iterator[Growth]:
-    """Grow from a seed: from both ends of a line, and from those of its places that no rail has reached."""
-    reached = np.empty((0, 2))
-    for place in (*places[:1], *places[:0:-1]):
-        if len(reached) and np.hypot(*(reached - place).T).min() <= settings.parameters.search_m + SAME_M:
-            continue
-        grown = grow(heads, place, settings, progress)
-        if grown is not None:
-            yield grown
-            reached = np.concatenate([reached, grown.rails[0].xyz[:, :2]])
 
 
 class Cloud:
@@ -188,16 +176,27 @@ class Cloud:
         return read_stored(files_of(key, self._sorted), POINT)
 
 
-def _check_seeds(request: Request, places: np.ndarray) -> None:
-    """Refuse seeds of which none is in the cloud.
+def _in_cloud(request: Request, seeds: Sequence[np.ndarray]) -> list[np.ndarray]:
+    """Return the places of each seed, (k, 2), that may be in the cloud.
 
     Raises
     ------
     OffCloudError
+        None is.
     """
-    near = Guide(places, np.zeros_like(places), NEAR_M)
-    if not any(near.reaches(*box_of(request, [header.extent])) for header in request.headers):
+    boxes = [box_of(request, [header.extent]) for header in request.headers]
+    found = [seed[_inside(seed, boxes)] for seed in seeds]
+    if not any(map(len, found)):
         raise OffCloudError("No seed is in the cloud: check the place and the coordinate system of the seeds.")
+    return found
+
+
+def _inside(xy: np.ndarray, boxes: Sequence[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
+    """Return which places, (k, 2), are in a box or near it, (k,) bool; a box of NaN may be anywhere."""
+    inside = np.zeros(len(xy), dtype=bool)
+    for low, high in boxes:
+        inside |= ~((xy < low - NEAR_M) | (xy > high + NEAR_M)).any(axis=1)
+    return inside
 
 
 def _figures(xyz: np.ndarray, settings: GrowSettings) -> SearchFigures:
@@ -208,24 +207,22 @@ def _figures(xyz: np.ndarray, settings: GrowSettings) -> SearchFigures:
 
 def _lengths(growths: Sequence[Growth]) -> SearchFigures:
     """Sum up the length of rails with and without a partner; what several seeds reach counts once."""
-    known, paired_m, single_m = np.empty((0, 2)), 0.0, 0.0
-    for growth in growths:
-        for rail in growth.rails:
-            xy = rail.xyz[:, :2]
-            new = np.isinf(cKDTree(known).query(xy, distance_upper_bound=SAME_M)[0]) if len(known) else True
-            length_m = float((np.gradient(Polyline(xy).t) * new * rail.seen).sum())
-            if len(growth.rails) > 1:
-                paired_m += length_m
-            else:
-                single_m += length_m
-            known = np.concatenate([known, xy])
-    return SearchFigures(paired_m=paired_m, single_m=single_m)
+    rails = [(rail, len(growth.rails) > 1) for growth in growths for rail in growth.rails]
+    owner = np.repeat(np.arange(len(rails)), [len(rail.xyz) for rail, _ in rails])
+    pairs = cKDTree(np.concatenate([rail.xyz[:, :2] for rail, _ in rails])).query_pairs(SAME_M, output_type="ndarray")
+    known = np.zeros(len(owner), dtype=bool)
+    known[pairs[owner[pairs[:, 0]] != owner[pairs[:, 1]], 1]] = True
+    lengths_m = {True: 0.0, False: 0.0}
+    for number, (rail, is_paired) in enumerate(rails):
+        own_m = np.gradient(Polyline(rail.xyz).t) * ~known[owner == number] * rail.seen
+        lengths_m[is_paired] += float(own_m.sum())
+    return SearchFigures(paired_m=lengths_m[True], single_m=lengths_m[False])
 
 
-def _stops(growths: Sequence[Growth]) -> tuple[Stop, ...]:
+def _stops(growths: Growths) -> tuple[Stop, ...]:
     """List where rails were not followed further; what several seeds reach counts once."""
     stops: list[Stop] = []
-    for stop in (stop for growth in growths for stop in growth.stops):
+    for stop in growths.stops():
         if all(np.hypot(*(stop.xyz - one.xyz)[:2]) > SAME_M for one in stops):
             stops.append(stop)
     return tuple(stops)
@@ -251,11 +248,13 @@ def _report(
 
 def described(growth: Growth, request: Request | None = None) -> str:
     """Say how far rails were followed, why they end and, given the request for the points, where."""
-    first, last = (
-        f"{_place(stop.xyz, request)}, where {stop.reason.value}" if request else f"where {stop.reason.value}"
-        for stop in growth.stops
-    )
     lengths = " and ".join(f"{rail.length_m:.0f} m" for rail in growth.rails)
+    places = [_place(stop.xyz, request) if request else "" for stop in growth.stops]
+    reasons = [stop.reason.value for stop in growth.stops]
+    if len(set(reasons)) == 1:
+        between = f" from {places[0]} to {places[1]}" if request else ""
+        return f"Followed {lengths} of rail{between}: at both ends, {reasons[0]}."
+    first, last = (", ".join(filter(None, (place, f"where {reason}"))) for place, reason in zip(places, reasons))
     return f"Followed {lengths} of rail from {first}, to {last}."
 
 

@@ -19,6 +19,15 @@ from .exchange import write_alignments
 FORMATS = {".xml": "LandXML", ".landxml": "LandXML", ".ifc": "IFC", ".dxf": "DXF"}
 """Format of a file by the ending of its name."""
 
+_OF_FIT = "how well the elements fit the measured track: deviations and standard errors"
+
+LEFT_OUT = {
+    "LandXML": _OF_FIT,
+    "IFC": _OF_FIT,
+    "DXF": "the coordinate system, stations and deviations, nor elements: curves are polylines, and texts name them",
+}
+"""What the element table has and a file of a format has not."""
+
 
 def check_format(path: Path) -> None:
     """Check that the name of a file states a format.
@@ -48,7 +57,7 @@ def check_designs(alignments: Sequence[Alignment], progress: Progress) -> None:
             "system in metres."
         )
     for alignment in progress.follow(alignments):
-        check_joined(alignment)
+        check_joined(alignment, progress)
         if alignment.cant and not alignment.vertical:
             progress.warning(f"Track {alignment.track_id} has cant but no profile: IFC files leave the cant out.")
 
@@ -83,6 +92,16 @@ def write_designs(
         write_ifc(path, alignments, delivery, progress)
     else:
         write_alignments(path, alignments, progress)
+
+
+def left_out(path: Path, alignments: Sequence[Alignment]) -> str:
+    """Say what a file does not hold: what its format has no place for, and layouts that the table does not have."""
+    said = [f"{path.name} does not hold {LEFT_OUT[FORMATS[path.suffix.lower()]]}."]
+    for layout, name in (("vertical", "profile"), ("cant", "cant")):
+        without = [str(one.track_id) for one in alignments if not getattr(one, layout)]
+        if without:
+            said.append(f"No {name} of {'track' if len(without) == 1 else 'tracks'} {', '.join(without)}.")
+    return " ".join(said)
 
 
 def check_place(name: str, frame: LocalFrame, east_first: bool, progress: Progress) -> None:

@@ -13,6 +13,7 @@ import csv
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import chain, islice
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -50,6 +51,9 @@ TEXT_M = 0.8
 
 OTHER_COLOUR = 30
 """Orange, for findings and stops."""
+
+GROUPS_AT_ONCE = 1_000
+"""Groups of a drawing that are written between two checks for cancellation."""
 
 ID_FIELDS = ("rail_id", "track_id", "guide_id", "finding", "class_code")
 """Fields that a row of a vertex has."""
@@ -223,11 +227,11 @@ def _put_drawing(file: TextIO, entities: Sequence[Entity], progress: Progress = 
     names = sorted({layer for layer, _ in entities})
     groups += _table("LAYER", [[(2, name), (70, 0), (62, _colour(name)), (6, "CONTINUOUS")] for name in names])
     groups += [(0, "ENDSEC"), (0, "SECTION"), (2, "ENTITIES")]
-    _put(file, groups)
-    for _, entity in entities:
+    entities_of = chain.from_iterable(entity for _, entity in entities)
+    everything = chain(groups, entities_of, [(0, "ENDSEC"), (0, "EOF")])
+    while part := list(islice(everything, GROUPS_AT_ONCE)):
         progress.check()
-        _put(file, entity)
-    _put(file, [(0, "ENDSEC"), (0, "EOF")])
+        _put(file, part)
 
 
 def _polyline(xyz: np.ndarray, layer: str, data: Sequence[tuple[int, Any]]) -> Iterator[tuple[int, Any]]:

@@ -147,8 +147,8 @@ def stops_layer(stops: Sequence[Stop]) -> Layer:
 
 
 def elements_layer(alignments: Sequence[Alignment], progress: Progress = SILENT) -> Layer:
-    """Make a layer of the element tables of alignments, each element with its curve; it can be cancelled."""
-    table = [row for alignment in alignments for row in rows(alignment)]
+    """Make a layer of the element tables of alignments, each element with its curve."""
+    table = [row for alignment in alignments for row in rows(alignment, progress)]
     columns = [[row[field.name] for row in table] for field in ELEMENTS.fields]
     curves = []
     for alignment in alignments:

@@ -69,7 +69,11 @@ i.arc { background: #90bdf0; }
 
 
 def build_alignment_page(
-    courses: Sequence[tuple[Alignment, Deviations]], source: str, facts: Mapping[str, str], fitted: bool
+    courses: Sequence[tuple[Alignment, Deviations]],
+    source: str,
+    facts: Mapping[str, str],
+    fitted: bool,
+    warnings: Sequence[str] = (),
 ) -> str:
     """Return the report on alignments and the tracks beside them.
 
@@ -82,12 +86,19 @@ def build_alignment_page(
         Facts to state by name, besides date, version and coordinate system.
     fitted : bool
         Whether the alignments were fitted to these tracks.
+    warnings : sequence of str
+        What the user was warned of.
 
     Returns
     -------
     str
         A complete HTML document.
     """
+    stated_facts = {
+        **stated(courses[0][0].frame.crs_wkt),
+        **facts,
+        **({"Check": " ".join(warnings)} if warnings else {}),
+    }
     slews, lifts = (np.concatenate([getattr(found, name) for _, found in courses]) for name in ("slew_mm", "lift_mm"))
     return page(
         f"Rail Extract: {source}",
@@ -95,7 +106,7 @@ def build_alignment_page(
         source,
         _tiles(courses, slews, lifts),
         *(_track(alignment, found) for alignment, found in courses),
-        made({**stated(courses[0][0].frame.crs_wkt), **facts}, (NOTE, *([PROPOSAL] if fitted else []))),
+        made(stated_facts, (NOTE, *([PROPOSAL] if fitted else []))),
         style=ALIGNMENT_STYLE,
     )
 

@@ -12,6 +12,7 @@ import subprocess  # nosec B404 - starts this Python only
 import sys
 import threading
 import time
+import traceback
 from collections.abc import Hashable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -31,6 +32,9 @@ NO_WINDOW = getattr(subprocess, "CREATE_NO_WINDOW", 0)
 
 REPORT_EVERY_S = 0.1
 """Least time between two reports of the fraction that is done, and interval at which cancellation is checked."""
+
+NOTES = "__notes__"
+"""What Python 3.11 and newer write below a traceback: here, that of the worker process, which is not sent itself."""
 
 
 class Kind(IntEnum):
@@ -177,12 +181,15 @@ def answer(content: bytes, once: Once, send: Send) -> Answer:
 
 
 def _sendable(error: BaseException) -> BaseException:
-    """Return an error, or one that says the same if it can't be pickled or made again."""
-    try:
-        pickle.loads(pickle.dumps(error))  # nosec B301
-        return error
-    except Exception:
-        return RuntimeError(f"{type(error).__name__}: {error}")
+    """Return an error with its traceback as a note, or one that says the same if it can't be pickled or made again."""
+    text = "".join(traceback.format_exception(type(error), error, error.__traceback__))
+    again = RuntimeError(f"{type(error).__name__}: {error}")
+    for one in (error, again):
+        with suppress(Exception):
+            setattr(one, NOTES, [f"In a worker process:\n{text}"])
+            pickle.loads(pickle.dumps(one))  # nosec B301
+            return one
+    return again
 
 
 class _Heard(Progress):

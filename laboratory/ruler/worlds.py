@@ -40,8 +40,8 @@ NEAR_M = 0.05
 BIN_M, END_M = 1.0, 3.0
 """Length of rail over which points are counted, and length at both ends of what the cloud shows that is left out."""
 
-MAX_GAP_M = Parameters.max_gap_m
-"""A rail that the cloud hides over more than this may be two lines."""
+BREAK_M = 2 * Parameters.max_gap_m
+"""Length of rail that the cloud hardly shows in which its line may end once: what is bridged, on either side."""
 
 FALSE_M = 3.0
 """Greatest length of lines that are on no rail."""
@@ -351,19 +351,15 @@ class _Ruler:
     def expected(self) -> tuple[int, int]:
         """Return the least and the largest number of lines that are right.
 
-        Each rail of which more than `END_M` is to be found is a line. It may be more where the cloud hides more of it
-        than is bridged; what shows less than is to be found may have lines, or not.
+        Each rail of which more than `END_M` is to be found is a line. What need not be found, apart from the ends, may
+        break a line once in each `BREAK_M`.
         """
         least = most = 0
         for number in range(self.found.truth_count):
             mine = self.pieces.number == number
-            t, seen = self.pieces.middle_t[mine], self.shown[mine]
-            least += bool(self.pieces.lengths[mine][seen].sum() > END_M)
-            borders = np.flatnonzero(np.diff(t[seen]) > MAX_GAP_M)
-            hidden = 0
-            if seen.any():
-                hidden = (t[seen][0] > 2 * END_M + MAX_GAP_M) + (t[-1] - t[seen][-1] > 2 * END_M + MAX_GAP_M)
-            most += 1 + len(borders) + hidden
+            seen_m, rail_m = (float(self.pieces.lengths[which].sum()) for which in (mine & self.shown, mine))
+            least += seen_m > END_M
+            most += 1 + int(max(rail_m - seen_m - 2 * END_M, 0.0) / BREAK_M + 0.5)
         return int(least), int(most)
 
     def _least_found(self) -> np.ndarray | None:

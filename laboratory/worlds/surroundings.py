@@ -11,9 +11,9 @@ from ..scenes import raw_things as things
 from ..scenes.raw import Thing
 from ..scenes.raw_world import (
     FASTENING,
-    GUARD,
     MAST,
     RAIL_HEIGHT_M,
+    THIRD,
     TRAIN,
     WALL,
     Bedding,
@@ -28,6 +28,7 @@ from ..scenes.raw_world import (
 from .draws import chosen, even_in_log, maybe, one_of, stream
 from .rails import lay
 from .railway import Railway
+from .surveys import FROM_ABOVE, IMAGES, TRIPOD
 
 BALLAST, SLAB, STREET = "ballast", "slab", "street"
 BEDS = {
@@ -50,6 +51,9 @@ LANDS = {
 CLEAR_M = {"trough": 1.75, "low": 1.45, "high": 2.3}
 """Least distance from the axis of any track of what stands out of the ballast little, lies there, and stands high."""
 
+WAGON_CLEAR_M = 3.0
+"""Least distance of a track with wagons from others, and from the scanner."""
+
 SECTION_M = 0.5
 """Distance of the places along the line at which room is looked for."""
 
@@ -70,6 +74,8 @@ class Surroundings:
     names : tuple of str
         What was built.
     half_width_m : float
+    rise : callable
+        Height of the ground above the tops of the rails, metres, by the place to the left of the reference line.
     paved_m : tuple of float or None
         Section along the reference line, metres, in which rails are in a pavement.
     """
@@ -80,28 +86,30 @@ class Surroundings:
     whole: Thing
     names: tuple[str, ...]
     half_width_m: float
+    rise: Callable[[float], float]
     paved_m: tuple[float, float] | None = None
 
 
-def draw_surroundings(seed: int, railway: Railway, from_above: bool) -> Surroundings:
-    """Draw what the tracks of a world lie in; nothing is seen from above in a tunnel."""
+def draw_surroundings(seed: int, railway: Railway, survey: str) -> Surroundings:
+    """Draw what the tracks of a world lie in: no tunnel seen from above, no rails in images level with ballast."""
     rng = stream(seed, "surroundings")
     bed = chosen(rng, BEDS[railway.family])
     if bed == STREET and not railway.plain:
         bed = BALLAST
     land = chosen(rng, LANDS[railway.family])
-    if (land in (TUNNEL, BRIDGE) and not railway.plain) or (land == TUNNEL and from_above) or bed == STREET:
+    if (land in (TUNNEL, BRIDGE) and not railway.plain) or (land == TUNNEL and survey in FROM_ABOVE) or bed == STREET:
         land = FLAT
-    bedding = _bedding(rng, railway, bed)
+    bedding = _bedding(rng, railway, bed, survey)
     half_width_m = _half_width(rng, railway)
     built = _Built(rng, railway, bedding, half_width_m)
     crossing = _crossing(rng, railway, bed, land)
-    base = _base(rng, railway, bed, land, crossing)
-    _furnish(built, bed, land, crossing)
+    terrain = Terrain.drawn(rng, railway, land)
+    base = _base(rng, railway, bed, terrain, crossing)
+    _furnish(built, bed, land, crossing, survey)
     names = (*(["level crossing"] if crossing else []), *built.names)
     whole = _together(seed, railway, (*base, *built.things))
     paved_m = (0.0, railway.reference.length_m) if bed == STREET else crossing
-    return Surroundings(bed, land, bedding, whole, names, half_width_m, paved_m)
+    return Surroundings(bed, land, bedding, whole, names, half_width_m, terrain.rise, paved_m)
 
 
 def _together(seed: int, railway: Railway, built: Sequence[Thing]) -> Thing:
@@ -126,11 +134,13 @@ def _half_width(rng: np.random.RandomState, railway: Railway) -> float:
     return float(min(widest + branches + rng.uniform(3.5, 8.0), 0.45 / max(sharpest, 1e-3) + 0.4 * widest))
 
 
-def _bedding(rng: np.random.RandomState, railway: Railway, bed: str) -> Bedding:
+def _bedding(rng: np.random.RandomState, railway: Railway, bed: str, survey: str) -> Bedding:
     """Draw the ballast, from 12 cm below the rails' feet to their heads, and the sleepers."""
     height_m = RAIL_HEIGHT_M * railway.standard.head_width_m / 0.072
     fill = chosen(rng, {"tidy": 60, "thin": 15, "full": 17, "buried": 8})
     fills = {"tidy": (0.0, 0.05), "thin": (0.05, 0.11), "full": (-0.10, 0.0), "buried": (-height_m + 0.01, -0.10)}
+    if fill == "buried" and survey == IMAGES:
+        fill = "full"
     timber = maybe(rng, 0.35)
     return Bedding(
         fill_m=float(rng.uniform(*fills[fill])),
@@ -141,7 +151,8 @@ def _bedding(rng: np.random.RandomState, railway: Railway, bed: str) -> Bedding:
         sleeper_step_m=float(rng.uniform(0.55, 0.75)),
         sleeper_width_m=float(rng.uniform(0.20, 0.26) if timber else rng.uniform(0.25, 0.32)),
         sleeper_length_m=float(railway.standard.gauge_m + rng.uniform(0.8, 1.2)),
-        heap_m=float(rng.uniform(-0.15, 0.15) if maybe(rng, 0.4) else 0.0),
+        # Ballast heaped beside a track would bury the rails of a branch.
+        heap_m=float(rng.uniform(-0.15, 0.15 if railway.plain else 0.0) if maybe(rng, 0.4) else 0.0),
     )
 
 
@@ -158,13 +169,93 @@ def _crossing(rng: np.random.RandomState, railway: Railway, bed: str, land: str)
     return float(start_m), float(start_m + length_m)
 
 
+@dataclass(frozen=True)
+class Terrain:
+    """The ground beside the bed.
+
+    Attributes
+    ----------
+    land : str
+    low_m, high_m : float
+        Outermost tracks, to the left of the reference line.
+    depth_m : float
+        Below the tops of the rails.
+    slope, tall_m : float
+        Of banks and cuttings: rise for each metre, and height.
+    reach_m : float
+        From the axis of the outermost track to the edge of a slope.
+    side : int
+        +1 where the ground rises to the left.
+    wave_m : float
+        Length of waves along the line.
+    """
+
+    land: str
+    low_m: float
+    high_m: float
+    depth_m: float
+    slope: float
+    tall_m: float
+    reach_m: float
+    side: int
+    wave_m: float
+
+    @classmethod
+    def drawn(cls, rng: np.random.RandomState, railway: Railway, land: str) -> Terrain:
+        """Draw the ground beside the tracks of a railway."""
+        return cls(
+            land,
+            *railway.lefts_m,
+            depth_m=rng.uniform(0.3, 1.2),
+            slope=rng.uniform(0.4, 1.0),
+            tall_m=rng.uniform(1.0, 4.0),
+            reach_m=rng.uniform(2.8, 4.5),
+            side=one_of(rng, (1, -1)),
+            wave_m=rng.uniform(8.0, 30.0),
+        )
+
+    def beyond_m(self, across: np.ndarray) -> np.ndarray:
+        """How far places across are beyond the edge of the slopes, (m,)."""
+        return np.maximum(np.maximum(self.low_m - self.reach_m - across, across - self.high_m - self.reach_m), 0.0)
+
+    def shape(self, across: np.ndarray) -> np.ndarray:
+        """Heights above the tops of the rails at places across, (m,)."""
+        rise = self.slope * self.beyond_m(across)
+        if self.land == BANK:
+            rise = -np.minimum(rise, self.tall_m)
+        elif self.land == CUTTING:
+            rise = np.minimum(rise, self.tall_m)
+        elif self.land == SIDE_SLOPE:
+            uphill = self.side * np.sign(across - (self.low_m + self.high_m) / 2)
+            rise = np.clip(uphill * rise, -self.tall_m, self.tall_m)
+        else:
+            rise = np.full(len(across), {BRIDGE: -50.0, TUNNEL: -0.2}.get(self.land, 0.0))
+        return rise - self.depth_m
+
+    def rise(self, left_m: float) -> float:
+        """Height above the tops of the rails at a place to the left of the reference line."""
+        return float(self.shape(np.array([left_m]))[0])
+
+    def heights(self, world: World) -> np.ndarray:
+        """Heights of the ground of a world, (profiles, m)."""
+        across = world.across_m
+        top = np.nan_to_num(world.ways[0].top_m)[:, None]
+        wave = 0.08 * np.sin(2 * np.pi * world.station / self.wave_m)[:, None] * (self.beyond_m(across) > 0)
+        height = top + self.shape(across) + wave
+        for way in world.ways:
+            # Where branches enter a slope, it has been dug away.
+            near = np.abs(across - way.left_m[:, None]) < 2.6
+            with np.errstate(invalid="ignore"):
+                height = np.where(near, np.minimum(height, way.top_m[:, None] - 0.45), height)
+        return height
+
+
 def _base(
-    rng: np.random.RandomState, railway: Railway, bed: str, land: str, crossing: tuple[float, float] | None
+    rng: np.random.RandomState, railway: Railway, bed: str, terrain: Terrain, crossing: tuple[float, float] | None
 ) -> list[Thing]:
     """Lay bed, ground, rails and pavement."""
     groove = rng.uniform(0.038, 0.075), rng.uniform(0.035, 0.065)
     gap_m, rough_m = float(one_of(rng, (0.0, 0.015))), float(rng.uniform(0.001, 0.004))
-    shape = _terrain(rng, railway, land)
     lined, deck_m = rng.uniform(3.0, 4.0), rng.uniform(1.5, 3.0)
     depth_m = rng.uniform(4.0, 9.0)
 
@@ -174,47 +265,18 @@ def _base(
             return
         # On a street, rails are crowns between the stones: their feet are never seen.
         road = np.zeros(len(world.station), dtype=bool) if crossing is None else world.between(*crossing)
-        ground(world, shape(world), ~road)
+        ground(world, terrain.heights(world), ~road)
         lay(world, railway.tracks, ~road)
         if crossing is not None:
             pavement(world, road, groove, gap_m, roughness_m=rough_m)
 
     low, high = railway.lefts_m
     middle = (low + high) / 2
-    if land == TUNNEL:
+    if terrain.land == TUNNEL:
         return [laid, lambda world: things.tunnel(world, (high - low) / 2 + lined, middle)]
-    if land == BRIDGE:
+    if terrain.land == BRIDGE:
         return [laid, lambda world: things.viaduct(world, (high - low) / 2 + 1.7 + deck_m, middle, depth_m)]
     return [laid]
-
-
-def _terrain(rng: np.random.RandomState, railway: Railway, land: str) -> Callable[[World], np.ndarray]:
-    """Draw the ground beside the bed: heights, (profiles, m), below that of the first track."""
-    depth_m, slope, reach_m = rng.uniform(0.3, 1.2), rng.uniform(0.4, 1.0), rng.uniform(2.8, 4.5)
-    tall_m, side, length_m = rng.uniform(1.0, 4.0), one_of(rng, (1, -1)), rng.uniform(8.0, 30.0)
-    low, high = railway.lefts_m
-
-    def shape(world: World) -> np.ndarray:
-        across = world.across_m
-        beyond = np.maximum(np.maximum(low - reach_m - across, across - high - reach_m), 0.0)
-        rise = {
-            BANK: -np.minimum(slope * beyond, tall_m),
-            CUTTING: np.minimum(slope * beyond, tall_m),
-            SIDE_SLOPE: np.clip(side * slope * np.sign(across - (low + high) / 2) * beyond, -tall_m, tall_m),
-        }.get(land, np.zeros(len(across)))
-        if land in (TUNNEL, BRIDGE):
-            rise = np.full(len(across), -50.0 if land == BRIDGE else -0.2)
-        top = np.nan_to_num(world.ways[0].top_m)[:, None]
-        wave = 0.08 * np.sin(2 * np.pi * world.station / length_m)[:, None] * (beyond > 0)
-        height = top - depth_m + rise + wave
-        for way in world.ways:
-            # Where branches enter a slope, it has been dug away.
-            near = np.abs(across - way.left_m[:, None]) < 2.6
-            with np.errstate(invalid="ignore"):
-                height = np.where(near, np.minimum(height, way.top_m[:, None] - 0.45), height)
-        return height
-
-    return shape
 
 
 class _Built:
@@ -256,7 +318,7 @@ class _Built:
         return float(self.high_m + distance_m if maybe(self.rng, 0.5) else self.low_m - distance_m)
 
 
-def _furnish(built: _Built, bed: str, land: str, crossing: tuple[float, float] | None) -> None:
+def _furnish(built: _Built, bed: str, land: str, crossing: tuple[float, float] | None, survey: str) -> None:
     """Build what the place suggests, each with its own chance."""
     rng, family = built.rng, built.railway.family
     open_land = land not in (TUNNEL, BRIDGE)
@@ -266,7 +328,7 @@ def _furnish(built: _Built, bed: str, land: str, crossing: tuple[float, float] |
             continue
         if name in PLAIN_ONLY and (not built.railway.plain or crossing is not None or built.railway.other_gauges_m):
             continue
-        if name == "platform" and family == "yard":
+        if (name == "platform" and family == "yard") or (name == "cars" and survey == TRIPOD):
             continue
         build(built, name)
 
@@ -354,17 +416,28 @@ def _spare_rail(built: _Built, name: str) -> None:
     def spare(world: World) -> None:
         left, top = rail_place(world.ways[number], 1, inward)
         drop = 0.09 * world.head_width_m / 0.072 if lying else 0.0
-        rail(world, left, top - drop + low, world.between(start, end), (GUARD, GUARD), np.pi / 2 if lying else 0.0)
+        rail(world, left, top - drop + low, world.between(start, end), (THIRD, THIRD), np.pi / 2 if lying else 0.0)
 
     built.add(name, spare)
 
 
 def _train(built: _Built, name: str) -> None:
-    """Park wagons on a track other than that of the scanner."""
-    if len(built.ways) > 1:
-        number = built.rng.randint(1, len(built.ways))
-        start = built.rng.uniform(-5.0, built.length_m * 0.6)
-        end = start + built.rng.randint(1, 4) * things.WAGON_M
+    """Park wagons on a track other than that of the scanner, where no other track is too close."""
+    start = built.rng.uniform(-5.0, built.length_m * 0.6)
+    end = start + built.rng.randint(1, 4) * things.WAGON_M
+    there = (built.station > start - 1.0) & (built.station < end + 1.0)
+    free = [
+        number
+        for number, way in enumerate(built.ways)
+        if all(
+            not np.any(np.abs(other.left_m - way.left_m)[there] < WAGON_CLEAR_M)
+            for other in built.ways
+            if other is not way
+        )
+        and np.all(np.abs(way.left_m[there]) > WAGON_CLEAR_M)
+    ]
+    if free:
+        number = one_of(built.rng, free)
         built.add(name, lambda world: things.train(world, number, start, end))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Union
 
@@ -26,7 +27,7 @@ MAX_POINTS = 1_400_000
 
 MAX_STEPS = 2.2e-4
 """Greatest product of the distance of profiles, in metres, and that of rays, in radians: 100 points per metre of a head
-7 cm wide at 3 m."""
+7 cm wide at 3 m. A scanner beside the tracks is three times as far away."""
 
 DOWN_SHARE = 0.62
 """About the share of the rays of a full turn that hit something within the width of a world."""
@@ -37,8 +38,11 @@ PASSES = {1: 60, 2: 27, 3: 8, 4: 5}
 APART_M = 0.030
 """Largest distance of two passes."""
 
-STAND_STEP_M = 0.05
-"""Distance of the profiles from which the points of a tripod are taken."""
+STAND_STEP_M, STANDS_M = 0.05, (20.0, 45.0)
+"""Distance of the profiles from which the points of a tripod are taken, and distance of its places."""
+
+AROUND_SHARE = 0.25
+"""About the share of the rays of half a sphere that hit something within the width of a world."""
 
 START_S, PASS_S, SPEED_M_S = 1000.0, 1200.0, 10.0
 """Time of the first pass, time between the beginnings of two passes, and speed."""
@@ -76,33 +80,46 @@ def draw_kind(seed: int) -> str:
     return chosen(stream(seed, "kind of survey"), KINDS)
 
 
-def draw_survey(seed: int, railway: Railway, half_width_m: float) -> Survey:
-    """Draw the survey of a world."""
+def draw_survey(seed: int, railway: Railway, half_width_m: float, rise: Callable[[float], float], wide: bool) -> Survey:
+    """Draw the survey of a world.
+
+    Parameters
+    ----------
+    seed : int
+    railway : Railway
+    half_width_m : float
+    rise : callable
+        Height of the ground above the rails, by the place to the left: scanners stand on it.
+    wide : bool
+        Whether there is room beside the tracks, as there is not in a tunnel.
+    """
     kind, rng, length_m = draw_kind(seed), stream(seed, "survey"), railway.reference.length_m
     if kind == MOBILE:
-        return _mobile(rng, railway, length_m)
+        return _mobile(rng, railway, length_m, rise, wide)
     if kind == TRIPOD:
-        return _tripods(rng, railway, length_m)
+        return _tripods(rng, railway, length_m, rise, wide)
     if kind == DRONE:
         return _drone(rng, half_width_m, length_m)
     return Survey(IMAGES, (_camera(rng, 2 * half_width_m * length_m),), has_times=False)
 
 
-def _mobile(rng: np.random.RandomState, railway: Railway, length_m: float) -> Survey:
+def _mobile(
+    rng: np.random.RandomState, railway: Railway, length_m: float, rise: Callable[[float], float], wide: bool
+) -> Survey:
     """Draw one to four passes on the first track, or beside the tracks."""
     count = chosen(rng, PASSES)
-    beside = maybe(rng, 0.12)
+    beside = maybe(rng, 0.12) and wide
     low, high = railway.lefts_m
     if beside:
         side = one_of(rng, (1, -1))
         left_m = (high if side > 0 else low) + side * rng.uniform(4.0, 7.0)
-        height_m = rng.uniform(1.8, 3.0)
+        height_m = max(rise(left_m), 0.0) + rng.uniform(1.8, 3.0)
     else:
         left_m, height_m = rng.uniform(-0.8, 0.8), rng.uniform(2.0, 4.8)
     profile_m, ray_rad = even_in_log(rng, 0.02, 0.12), even_in_log(rng, 0.0010, 0.0035)
     points = count * DOWN_SHARE * 2 * np.pi / ray_rad * length_m / profile_m
     coarser = max(np.sqrt(points / MAX_POINTS), 1.0)
-    coarser = min(coarser, np.sqrt(MAX_STEPS / (profile_m * ray_rad)))
+    coarser = min(coarser, np.sqrt((MAX_STEPS / 3 if beside else MAX_STEPS) / (profile_m * ray_rad)))
     first = RawScanner(
         profile_step_m=profile_m * coarser,
         ray_step_rad=ray_rad * coarser,
@@ -139,23 +156,25 @@ def _apart(rng: np.random.RandomState, count: int, most_m: float = APART_M) -> n
     return error * size_m / widest
 
 
-def _tripods(rng: np.random.RandomState, railway: Railway, length_m: float) -> Survey:
-    """Draw one to four places of a tripod, on either side of the tracks."""
-    count = rng.randint(1, 5)
+def _tripods(
+    rng: np.random.RandomState, railway: Railway, length_m: float, rise: Callable[[float], float], wide: bool
+) -> Survey:
+    """Draw places of a tripod 20 to 45 m apart, on either side of the tracks."""
+    count = int(np.ceil(length_m / rng.uniform(*STANDS_M)))
     low, high = railway.lefts_m
-    ray_rad, noise_m, height_m = even_in_log(rng, 0.0008, 0.003), even_in_log(rng, 0.001, 0.004), rng.uniform(1.2, 2.2)
-    ray_rad = max(ray_rad, np.sqrt(count * DOWN_SHARE * 2 * np.pi / MAX_POINTS))
+    ray_rad, noise_m, height_m = even_in_log(rng, 0.0008, 0.002), even_in_log(rng, 0.001, 0.004), rng.uniform(1.2, 2.2)
+    ray_rad = max(ray_rad, np.sqrt(count * AROUND_SHARE * 2 * np.pi / MAX_POINTS))
     scanners, apart = [], _apart(rng, count, 0.002)
     for number in range(count):
         side = one_of(rng, (1, -1))
-        left_m = (high if side > 0 else low) + side * rng.uniform(1.9, 4.0)
+        left_m = (high if side > 0 else low) + side * rng.uniform(1.9, 4.0 if wide else 2.5)
         stand_m = (number + rng.uniform(0.25, 0.75)) * length_m / count
         scanners.append(
             RawScanner(
                 profile_step_m=STAND_STEP_M,
                 ray_step_rad=ray_rad,
                 left_m=left_m,
-                height_m=height_m,
+                height_m=max(rise(left_m), 0.0) + height_m,
                 noise_m=noise_m,
                 half_range_m=rng.uniform(40.0, 100.0),
                 swing=0.0,

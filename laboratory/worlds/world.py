@@ -14,10 +14,10 @@ from ..scenes.scene import RAIL, Scene
 from ..scenes.write import write_cloud, write_raw
 from .classes import Classification, classified, draw_classification
 from .railway import Railway, draw_railway
-from .surroundings import Surroundings, draw_surroundings
-from .surveys import FROM_ABOVE, Survey, draw_kind, draw_survey, marked
+from .surroundings import TUNNEL, Surroundings, draw_surroundings
+from .surveys import Survey, draw_kind, draw_survey, marked
 
-VERSION = 1
+VERSION = 5
 """Changes when a seed gives another world: results of different versions are never mixed."""
 
 RAW, CLASSIFIED = "raw", "classified"
@@ -99,19 +99,19 @@ def make(seed: int, cloud: str = RAW) -> World:
         One of `CLOUDS`: the world is the same, and raw or classified.
     """
     railway = draw_railway(seed)
-    surroundings = draw_surroundings(seed, railway, draw_kind(seed) in FROM_ABOVE)
-    survey = draw_survey(seed, railway, surroundings.half_width_m)
+    around = draw_surroundings(seed, railway, draw_kind(seed))
+    survey = draw_survey(seed, railway, around.half_width_m, around.rise, around.land != TUNNEL)
     scene = scan_world(
         f"world {seed}",
         railway.tracks,
         railway.standard,
         survey.scanners,
-        [surroundings.whole],
+        [around.whole],
         seed,
-        surroundings.bedding,
+        around.bedding,
         railway.reference,
         railway.other_gauges_m,
-        surroundings.half_width_m,
+        around.half_width_m,
     )
     scene = marked(scene, survey, railway.reference)
-    return World(seed, railway, surroundings, survey, scene, draw_classification(seed) if cloud == CLASSIFIED else None)
+    return World(seed, railway, around, survey, scene, draw_classification(seed) if cloud == CLASSIFIED else None)

@@ -50,7 +50,9 @@ def sentence_for(error: BaseException, definitions: Sequence[QgsProcessingParame
 
 def _log(error: BaseException) -> None:
     """Write a traceback into the log panel; a command line has none, so there it goes to the error output."""
-    text = masked("".join(traceback.format_exception(type(error), error, error.__traceback__)))
+    lines = traceback.format_exception(type(error), error, error.__traceback__)
+    own = [] if sys.version_info >= (3, 11) else getattr(error, "__notes__", [])  # newer Pythons write them themselves
+    text = masked("".join([*lines, *own]))
     QgsMessageLog.logMessage(text, LOG, Qgis.MessageLevel.Critical)
     if QgsApplication.platform() == COMMAND_LINE:
         print(text, file=sys.stderr)

@@ -55,11 +55,11 @@ class StationAlongAxis(RailAlgorithm):
 
     def compute(self, job: Job, values: ParameterValues, progress: Progress) -> dict[str, Any]:
         """Locate the features, then write them with their kilometres."""
-        from ..reading.places import locate_features, station_fields
+        from ..reading.places import kept_fields, locate_features, station_fields
 
         located = locate_features(job.source, job.axes, job.plane, values.context, progress.span(0, LOCATING))
         added = fields(station_fields(job.source))
-        columns = QgsProcessingUtils.combineFields(job.source.fields(), added)
+        columns = QgsProcessingUtils.combineFields(kept_fields(job.source, progress), added)
         made = copies(located.features, columns, located.rows())
         shape, crs = job.source.wkbType(), job.source.sourceCrs()
         written = write_copy(values, "OUTPUT", columns, shape, made, crs)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -11,6 +12,7 @@ from qgis.core import (
     QgsProcessingParameterNumber,
 )
 
+from ...core.design_numbers import number_in
 from ...core.jobs.declaration import Parameter
 from .parameter_values import ParameterValues
 
@@ -56,6 +58,12 @@ def explain_invalid(
     context : QgsProcessingContext
     """
     given = definition.defaultValue() if value is None else value
-    if definition.checkValueIsAcceptable(given, context):
+    if definition.checkValueIsAcceptable(given, context) and not _is_no_number(definition, given):
         return None
     return parameter.refusal(given)
+
+
+def _is_no_number(definition: QgsProcessingParameterDefinition, given: Any) -> bool:
+    """Return whether a text is given for a number: QGIS leaves out that of an optional one without a word."""
+    number = number_in(given) if isinstance(given, str) else None
+    return isinstance(definition, QgsProcessingParameterNumber) and number is not None and math.isnan(number)

@@ -92,7 +92,8 @@ class GrowTask(QgsTask):
         settings = GrowSettings(self._standard.gauge_m, self._standard.head_width_m)
         seed = np.array([[self._seed.x(), self._seed.y()]])
         with points_folder() as folder, one_thread(*blas()):
-            _, (growth,) = grow_all(request, [seed], settings, folder, TaskProgress(self))
+            _, growths = grow_all(request, [seed], settings, folder, TaskProgress(self))
+        (growth,) = growths.grown
         to_crs = request.zero.to_crs
         return Shown(
             tuple(to_crs(rail.xyz)[:, :2] for rail in growth.rails),

@@ -26,13 +26,16 @@ from ...core.airborne.survey import Guide, gauge_of
 from ...core.clouds.crs import parse_crs, units
 from ...core.clouds.mask import Mask
 from ...core.design_places import check_line, check_places
-from ...core.errors import CrsError, MissingError, RailExtractError
+from ...core.errors import CrsError, MissingError, ParameterError, RailExtractError
 from ...core.jobs.lines import Lines, system_of, without_steps
 from ...core.jobs.values import Rows
 from ...core.progress import SILENT, Progress
 
 CHORD_TOLERANCE_M = 0.0005
 """Greatest deviation of the chords that approximate a curved line: well below the accuracy of a survey."""
+
+MIXED = "JSON"
+"""Type that QGIS gives to a field with values of several types: it takes them for objects, and is left with none."""
 
 GEOMETRY_AS_IT_IS = QgsProcessingFeatureSource.Flag.FlagSkipGeometryValidityChecks
 
@@ -71,10 +74,16 @@ def row_of(feature: QgsFeature) -> dict[str, Any]:
 
 
 def rows_of(source: QgsProcessingFeatureSource, progress: Progress = SILENT) -> Rows:
-    """Return the values of the features by the name of the field, None where one is empty, and all names."""
+    """Return the values of the features of a table by the name of the field, None where one is empty, and all names.
+
+    Raises
+    ------
+    ParameterError
+        QGIS drops the values of a field; see `value_of`.
+    """
     names = source.fields().names()
     features = progress.follow(source.getFeatures(QgsFeatureRequest(), GEOMETRY_AS_IT_IS), source.featureCount())
-    return [row_of(feature) for feature in features], names
+    return [{name: value_of(feature, name) for name in names} for feature in features], names
 
 
 def read_guide(
@@ -296,7 +305,19 @@ def _parts(geometry: QgsGeometry, chord: float) -> Iterator[np.ndarray]:
 
 
 def value_of(feature: QgsFeature, name: str) -> Any:
-    """Return the value of a field, or None if the field is missing or empty."""
+    """Return the value of a field, or None if the field is missing or empty.
+
+    Raises
+    ------
+    ParameterError
+        QGIS drops the values of the field, as it does where GeoJSON has both whole numbers and texts in one.
+    """
     index = feature.fields().lookupField(name)
     value = feature.attribute(index) if index >= 0 else NULL
-    return None if value == NULL else value
+    if value != NULL:
+        return value
+    if index >= 0 and feature.fields().at(index).typeName() == MIXED:
+        raise ParameterError(
+            f"The field {name} has both numbers and texts, and QGIS drops them all: write all of them as texts."
+        )
+    return None

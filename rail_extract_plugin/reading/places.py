@@ -9,6 +9,8 @@ import numpy as np
 from qgis.core import (
     QgsCoordinateReferenceSystem,
     QgsFeature,
+    QgsField,
+    QgsFields,
     QgsGeometry,
     QgsProcessingContext,
     QgsProcessingFeatureSource,
@@ -20,8 +22,9 @@ from ...core.design_places import are_places
 from ...core.fields import EXTENT_FIELDS, STATION_FIELDS, Field
 from ...core.progress import Progress
 from ...core.rails import Kilometres
+from ..compat import TEXT
 from .axes import moved_shapes
-from .line_layers import bounds_of
+from .line_layers import MIXED, bounds_of
 
 NOWHERE, FAR = np.full(2, np.nan), np.full(2, np.inf)
 """Place of a feature without geometry, and of one that is not on the map."""
@@ -61,6 +64,20 @@ def station_fields(source: QgsProcessingFeatureSource) -> tuple[Field, ...]:
     """Return the fields that the features of a layer get."""
     is_point = QgsWkbTypes.geometryType(source.wkbType()) == QgsWkbTypes.GeometryType.PointGeometry
     return STATION_FIELDS if is_point else (*STATION_FIELDS, *EXTENT_FIELDS)
+
+
+def kept_fields(source: QgsProcessingFeatureSource, progress: Progress) -> QgsFields:
+    """Return the fields of a layer as a copy has them: those of objects, which few formats hold, become texts."""
+    kept, objects = QgsFields(), []
+    for one in source.fields():
+        kept.append(QgsField(one.name(), TEXT) if one.typeName() == MIXED else one)
+        objects += [one.name()] if one.typeName() == MIXED else []
+    if objects:
+        progress.warning(
+            f"INPUT has objects, or both numbers and texts, in {', '.join(objects)}: objects become texts, and QGIS "
+            "drops numbers and texts that are in one field."
+        )
+    return kept
 
 
 def locate_features(

@@ -124,6 +124,5 @@ def _save(dialog: RunDialog, ids: Sequence[str], report: Path | None) -> None:
         dialog.messageBar().pushMessage("", str(error), Qgis.MessageLevel.Critical, 0)
         return
     move_to(layers, path)
-    beside = f", with the report in {copied.name}" if copied else ""
-    text = f"Saved {path}{beside}. The layers of the project are now those of this file."
+    text = f"Saved {' and '.join(one.name for one in (path, copied) if one)}. The project uses this file from now on."
     dialog.messageBar().pushMessage("", text, Qgis.MessageLevel.Success, 0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -94,11 +95,15 @@ def _shape_of(layer: Layer) -> QgsWkbTypes.Type:
 
 
 def copies(originals: Sequence[QgsFeature], columns: QgsFields, rows: Sequence[Sequence[Any]]) -> Iterator[QgsFeature]:
-    """Copy features with further values, (n, k), for the last fields of `columns`."""
+    """Copy features with further values, (n, k), for the last fields of `columns`; objects become texts."""
     for original, row in zip(originals, rows):
         feature = QgsFeature(columns)
         feature.setGeometry(original.geometry())
-        feature.setAttributes([*original.attributes(), *row[: columns.count() - len(original.attributes())]])
+        own = [
+            json.dumps(value, ensure_ascii=False) if isinstance(value, dict) else value
+            for value in original.attributes()
+        ]
+        feature.setAttributes([*own, *row[: columns.count() - len(own)]])
         yield feature
 
 
@@ -113,7 +118,8 @@ def add_features(sink: QgsFeatureSink, made: Iterator[QgsFeature]) -> int:
     count = 0
     for feature in made:
         if not sink.addFeature(feature, QgsFeatureSink.Flag.FastInsert):
-            raise RailExtractError(f"The output can't be written ({sink.lastError()}): check the free disk space.")
+            reason = " ".join(sink.lastError().split())
+            raise RailExtractError(f"The output can't be written ({reason}): check the free disk space.")
         count += 1
     return count
 

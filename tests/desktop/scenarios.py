@@ -20,6 +20,7 @@ from qgis.core import (
     QgsProcessingParameterEnum,
     QgsProject,
     QgsRectangle,
+    QgsSettings,
     QgsVectorFileWriter,
     QgsVectorLayer,
 )
@@ -488,9 +489,7 @@ def tried(driver: Driver) -> Iterator:
     log = dialog.findChild(QTextEdit, "txtLog")
     driver.keep("offered", log.toPlainText().splitlines()[-1])
     driver.keep("file", Path(rails).exists())
-    other = yield from open_dialog("rasterizerailpoints")
-    driver.keep("standard", other.mainWidget().wrappers["STANDARD"].value())
-    yield from close(other)
+    driver.keep("standard that is remembered", QgsSettings().value("rail_extract/standard"))
     dialog.setParameters({"EXTENT": PART["EXTENT"]})
     _follow(log, "Run on all")
     yield lambda: not button.isEnabled()

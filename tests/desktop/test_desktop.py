@@ -301,7 +301,7 @@ def test_a_part_is_tried_and_nothing_of_it_is_kept(run_scenario):
     west, south, east, north = session["extent in the map"]
     assert 10 < max(east - west, north - south) < 60
     assert session["offered"] == "Next: Run on all that is chosen"
-    assert (session["file"], session["standard"]) == (False, "EN_60E1_1435")
+    assert (session["file"], session["standard that is remembered"]) == (False, None)
     (run,) = session["at last"]
     assert run == "Extract rails: sample"
 
@@ -319,9 +319,7 @@ def test_the_standard_of_the_sample_is_not_that_of_the_user(run_scenario):
 def test_saved_layers_are_those_of_the_file(run_scenario):
     session = run_scenario("onwards")
     said, *files = session["saved"]
-    assert said.endswith(
-        "run.gpkg, with the report in run report.html. The layers of the project are now those of this file."
-    )
+    assert said == "Saved run.gpkg and run report.html. The project uses this file from now on."
     assert files == ["run report.html", "run.gpkg"]
     assert session["sources"] == ["run.gpkg"]
     assert session["decided"] == ["rejected", ""]

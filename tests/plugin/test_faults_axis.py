@@ -1,8 +1,12 @@
 """Faults of axes, posts and jumps, in Station Along Axis."""
 
+import json
+import math
+
 import pytest
 from faults import faults
 from memory_layers import layer_of
+from qgis.core import QgsGeometry, QgsLineString, QgsPoint
 
 AXIS = "LINESTRING(500000 3000000, 501000 3000000)"
 AXIS_M = "LINESTRING M(500000 3000000 12, 501000 3000000 13)"
@@ -11,12 +15,35 @@ LINE = "LINESTRING Z (500000 3000000 100, 500040 3000000 100)"
 PLACE = "POINT(500100 3000004)"
 
 
+def with_objects(bench):
+    """A GeoJSON file of a place with an object as one of its values, as exports of OpenStreetMap have."""
+    place = {"type": "Point", "coordinates": [500100, 3000004]}
+    feature = {"type": "Feature", "properties": {"tags": {"railway": "signal"}}, "geometry": place}
+    crs = {"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::32643"}}
+    path = bench.folder / "places.geojson"
+    path.write_text(json.dumps({"type": "FeatureCollection", "crs": crs, "features": [feature]}), encoding="utf-8")
+    return path
+
+
+def infinite_measure():
+    return QgsGeometry(QgsLineString([QgsPoint(5e5, 3e6, m=0.0), QgsPoint(5.01e5, 3e6, m=math.inf)]))
+
+
+def shape_of(line):
+    """A line as well-known text, or what a function makes once QGIS runs."""
+    return line() if callable(line) else line
+
+
 def given(axis=(AXIS,), kind="LineString", crs="EPSG:32643", places=("Point", PLACE), **parameters):
     """A layer of places and an axis; a function among the parameters makes the value."""
 
     def prepare(bench):
         made = {name: value() if callable(value) else value for name, value in parameters.items()}
-        return {"INPUT": layer_of(*places[1:], kind=places[0]), "AXIS": layer_of(*axis, kind=kind, crs=crs), **made}
+        return {
+            "INPUT": layer_of(*places[1:], kind=places[0]),
+            "AXIS": layer_of(*map(shape_of, axis), kind=kind, crs=crs),
+            **made,
+        }
 
     return prepare
 
@@ -61,6 +88,19 @@ FAULTS = {
             START_KM=1.0, JUMPS=jumps((1.2, 1.3), fields="&field=a:double&field=b:double")
         ),
         "jumps for an axis with M values": given((AXIS_M,), "LineStringM", JUMPS=jumps((12.2, 12.3))),
+        "places outside of any map": lambda bench: {
+            **given(START_KM=1.0)(bench),
+            "INPUT": layer_of(PLACE, "POINT(1e308 1e308)", kind="Point"),
+        },
+        "places with objects in a field": lambda bench: {**given(START_KM=1.0)(bench), "INPUT": with_objects(bench)},
+        "post with a kilometre of 1e308": given(POSTS=posts((0, 3, 1.0), (200, 3, 1e308))),
+        "post without a kilometre": given(POSTS=posts((0, 3, 1.0), (200, 3, None))),
+        "post outside of any map": given(POSTS=posts((0, 3, 1.0), (100, 3, 1.1), (1e200, 3, 1.2))),
+        "axis with a vertex outside of any map": given(("LINESTRING(500000 3000000, 1e200 3000000)",), START_KM=1.0),
+        "axis with a vertex 1,000,000 km away": given(("LINESTRING(500000 3000000, 999999999 3000000)",), START_KM=1.0),
+        "axis with an infinite M value": given((infinite_measure,), "LineStringM"),
+        "start of an axis that is a text": given(START_KM="km one"),
+        "jump to a kilometre of 1e308": given(START_KM=1.0, JUMPS=jumps((1.2, 1e308))),
         "table without places": given((AXIS_M,), "LineStringM", places=("None",)),
         "place between the arms of a hairpin": given(
             ("LINESTRING M(500000 3000000 0, 500500 3000000 500, 500500 3000100 600, 500000 3000100 1100)",),

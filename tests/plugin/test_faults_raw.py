@@ -75,6 +75,14 @@ FAULTS = {
         "guide with the coordinates of another system": guide(
             "LINESTRING(500000 3000020, 500040 3000020)", "EPSG:4326"
         ),
+        "guide outside of any map": guide("LINESTRING(500000 3000020, 1e200 3000020)"),
+        "guide with a stray vertex": guide("LINESTRING(500000 3000020, 550000 3000020, 500040 3000020)"),
+        "mask outside of any map": lambda bench: {
+            **raw()(bench),
+            "MASK": layer_of(
+                "POLYGON((500000 3000000, 1e200 3000000, 500000 3000040, 500000 3000000))", kind="Polygon"
+            ),
+        },
         "only the tracks along a guide that is missing": raw(ONLY_GUIDED=True),
         "guide across the tracks": guide("LINESTRING(500022 3000010, 500018 3000030)"),
         "only the tracks along a guide beside the track": guide(

@@ -31,6 +31,8 @@ FAULTS = {
         "one seed on a rail and one beside": seeds(ON_RAIL, BESIDE),
         "seed on a lone rail": raw(strip(12.0, rails=[lambda along: np.full_like(along, SPACING_M / 2)]), SEED=ON_MAP),
         "seed on the map": raw(SEED=ON_MAP),
+        "400 seeds at one place": seeds(*[ON_RAIL] * 400),
+        "seed outside of any map": seeds("POINT(1e200 3000000)"),
         "class of grown rails beyond a byte": seeds(ON_RAIL, RAIL_CLASS=256),
         "growth cancelled at 10 %": cancelled(seeds(ON_RAIL), 10),
         "growth cancelled at 40 %": cancelled(seeds(ON_RAIL), 40),

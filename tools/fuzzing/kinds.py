@@ -9,11 +9,21 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from .clouds import RAIL, SHAPES, write_copc, write_las, write_laz, write_vpc
-from .mutators import mutate, mutate_text
+from .mutators import mutator_for
+
+LINES = ("gpkg", "geojson", "shp")
+"""Formats of rails."""
+
+DESIGNS = {
+    **{name: f"read_{name}" for name in ("elements", "axis", "posts", "jumps", "places")},
+    **dict.fromkeys(("guide", "mask", "seeds"), "read_area"),
+}
+"""Layers of designs, kilometres and areas, and the functions of `designs` that read them."""
 
 
 @dataclass(frozen=True)
@@ -27,17 +37,17 @@ class Kind:
         Writes good files into a folder, and returns those to be damaged.
     read : callable
         Reads a damaged file. It may raise a `RailExtractError`; everything else is a failure.
-    damage : callable
-        Changes the bytes of a file.
     needs : str
         Module that must be installed.
+    remake : callable, optional
+        Writes a file again with other values, which is done in half of the cases instead of damaging its bytes.
     """
 
     name: str
     make: Callable[[Path], Sequence[Path]]
     read: Callable[[Path], object]
-    damage: Callable[[bytes, random.Random], bytes] = mutate
     needs: str = "numpy"
+    remake: Callable[[Path, random.Random], None] | None = None
 
     def mutant(self, folder: Path, good: Sequence[Path], seed: int) -> Path:
         """Copy the folder of the good files, damage one of them as a seed says, and return its path.
@@ -51,7 +61,10 @@ class Kind:
         """
         rng = random.Random(f"{self.name}:{seed}")
         path = self.copied(folder, rng.choice(list(good)))
-        path.write_bytes(self.damage(path.read_bytes(), rng))
+        if self.remake is not None and rng.random() < 0.5:
+            self.remake(path, rng)
+        else:
+            path.write_bytes(mutator_for(path)(path.read_bytes(), rng))
         return path
 
     def copied(self, folder: Path, path: Path) -> Path:
@@ -252,11 +265,24 @@ def _read_moving(path: Path) -> None:
         raise AssertionError("the temporary folder is still there")
 
 
-def _layers(name: str, function: str) -> Callable[[Path], Sequence[Path]]:
-    def call(path: Path) -> Sequence[Path]:
+def _layers(name: str, *values: str) -> Callable[..., Any]:
+    """Return a function of `layers`, which is imported when it is called, because it needs QGIS."""
+
+    def call(*given: Any) -> Any:
         from . import layers
 
-        return getattr(layers, function)(path, name) if function == "write_lines" else getattr(layers, function)(path)
+        return getattr(layers, name)(*given, *values)
+
+    return call
+
+
+def _designs(name: str, *values: str) -> Callable[..., Any]:
+    """Return a function of `designs` in the same way."""
+
+    def call(*given: Any) -> Any:
+        from . import designs
+
+        return getattr(designs, name)(*given, *values)
 
     return call
 
@@ -266,25 +292,26 @@ CORE = (
     Kind("laz", write_laz, _read_cloud),
     Kind("copc", write_copc, _read_cloud),
     Kind("copied", write_las, _copy_cloud),
-    Kind("vpc", write_vpc, _read_cloud, mutate_text),
+    Kind("vpc", write_vpc, _read_cloud),
     Kind("weights", _make_weights, _read_weights),
     Kind("work", _make_spool, _read_spool),
     Kind("stored", _make_stored, _read_stored),
-    Kind("moving", _make_moving, _read_moving, mutate_text),
-    Kind("names", _make_names, _read_names, mutate_text),
-    Kind("shapes", _make_shapes, _read_shapes, mutate_text, needs="pyogrio"),
+    Kind("moving", _make_moving, _read_moving),
+    Kind("names", _make_names, _read_names),
+    Kind("shapes", _make_shapes, _read_shapes, needs="pyogrio"),
     Kind("classifier", _make_classifier, _read_classifier, needs="torch"),
     Kind("training", _make_training, _read_training, needs="torch"),
 )
 """Kinds that need no QGIS; `make check` reads some of each."""
 
 PLUGIN = (
+    *(Kind(suffix, _layers("write_lines", suffix), _layers("read_lines"), "qgis.core") for suffix in LINES),
+    Kind("tif", _layers("write_raster"), _layers("read_raster"), "qgis.core"),
+    Kind("landxml", _designs("write_xml"), _designs("read_xml"), "qgis.core"),
     *(
-        Kind(suffix, _layers(suffix, "write_lines"), _layers(suffix, "read_lines"), damage, needs="qgis.core")
-        for suffix, damage in (("gpkg", mutate), ("geojson", mutate_text), ("shp", mutate))
+        Kind(name, _designs("write", name), _designs(read), "qgis.core", _designs("change_values"))
+        for name, read in DESIGNS.items()
     ),
-    Kind("tif", _layers("tif", "write_raster"), _layers("tif", "read_raster"), needs="qgis.core"),
-    Kind("areas", _layers("areas", "write_areas"), _layers("areas", "read_areas"), mutate_text, needs="qgis.core"),
 )
 
 KINDS = {kind.name: kind for kind in (*CORE, *PLUGIN)}

@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 import pickle
 import sys
-from collections.abc import Callable
-from contextlib import closing
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager
 from functools import lru_cache
 from pathlib import Path
 from sqlite3 import connect
@@ -32,8 +32,6 @@ from rail_extract.core.progress import Progress  # noqa: E402
 from rail_extract.core.squares import steps  # noqa: E402
 from rail_extract.core.tracks import centerlines  # noqa: E402
 
-from .clouds import SHAPES, write_las  # noqa: E402
-
 PAGE_BYTES = 512
 """Smallest page of a GeoPackage: a file of small pages has little that is never read."""
 
@@ -42,9 +40,6 @@ BLOCK_CELLS = 32
 
 REMEMBERED = 100
 """Results that are remembered."""
-
-AREAS = ("SEEDS", "GUIDE", "MASK")
-"""Parameters for the layers of `SHAPES`."""
 
 UNFORESEEN = ("Traceback", "failed unexpectedly")
 """Words of what must not be said about a damaged file."""
@@ -137,38 +132,22 @@ def write_raster(folder: Path) -> list[Path]:
     return [folder / "rail.tif", folder / "rows.tif"]
 
 
-def write_areas(folder: Path) -> list[Path]:
-    """Write seeds, a guide and a mask, and a raw cloud."""
-    write_las(folder)
-    paths = [folder / f"{name}.geojson" for name in AREAS]
-    for path, shape in zip(paths, SHAPES):
-        feature = f'{{"type": "Feature", "properties": {{}}, "geometry": {shape}}}'
-        crs = '{"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::32643"}}'
-        path.write_text(f'{{"type": "FeatureCollection", "crs": {crs}, "features": [{feature}]}}', encoding="utf-8")
-    return paths
-
-
-def read_areas(path: Path) -> None:
-    """Check the values of the algorithms that take seeds, a guide and a mask; they read them then."""
-    layers = {name: str(path.with_name(f"{name}.geojson")) for name in AREAS}
-    cloud = {"INPUT": str(path.with_name("1.4_7.las")), "OUTPUT": str(path.with_name("out.las"))}
-    _check("growrailpoints", {"SEEDS": layers["SEEDS"], **cloud})
-    _check("classifyrailpoints", {"GUIDE": layers["GUIDE"], "MASK": layers["MASK"], **cloud})
-
-
 def read_lines(path: Path) -> None:
     """Build track centerlines from a file of rails."""
     main = next(iter(path.parent.glob("lines.shp")), path)
-    _run("buildtrackcenterlines", {"INPUT": str(main), "OUTPUT": "memory:"})
+    with run("buildtrackcenterlines", {"INPUT": str(main), "OUTPUT": "memory:"}):
+        pass
 
 
 def read_raster(path: Path) -> None:
     """Vectorize a rail raster."""
-    _run("vectorizerails", {"INPUT": str(path), "OUTPUT": "memory:"})
+    with run("vectorizerails", {"INPUT": str(path), "OUTPUT": "memory:"}):
+        pass
 
 
-def _run(name: str, parameters: dict[str, Any]) -> None:
-    """Check the values and run an algorithm, as QGIS does.
+@contextmanager
+def run(name: str, parameters: dict[str, Any]) -> Iterator[tuple[dict[str, Any], QgsProcessingContext]]:
+    """Check the values and run an algorithm, as QGIS does; yields the results and the context with their layers.
 
     Raises
     ------
@@ -177,21 +156,26 @@ def _run(name: str, parameters: dict[str, Any]) -> None:
     AssertionError
         It failed without an explanation.
     """
-    algorithm, context, listener = _check(name, parameters), QgsProcessingContext(), Listener()
-    _, succeeded = algorithm.run(parameters, context, listener)
-    _judge(succeeded, "\n".join(listener.errors).strip(), context)
+    algorithm, context, listener = check(name, parameters), QgsProcessingContext(), Listener()
+    results, succeeded = algorithm.run(parameters, context, listener)
+    try:
+        _judge(succeeded, "\n".join(listener.errors).strip())
+        yield results, context
+    finally:
+        context.temporaryLayerStore().removeAllMapLayers()
 
 
-def _check(name: str, parameters: dict[str, Any]) -> QgsProcessingAlgorithm:
-    """Check the values of an algorithm, as QGIS does; errors as for `_run`."""
+def check(name: str, parameters: dict[str, Any]) -> QgsProcessingAlgorithm:
+    """Check the values of an algorithm, as QGIS does; errors as for `run`."""
     algorithm = qgis().processingRegistry().createAlgorithmById(f"railextract:{name}")
     context = QgsProcessingContext()
-    _judge(*algorithm.checkParameterValues(parameters, context), context)
+    accepted = algorithm.checkParameterValues(parameters, context)
+    context.temporaryLayerStore().removeAllMapLayers()
+    _judge(*accepted)
     return algorithm
 
 
-def _judge(succeeded: bool, said: str, context: QgsProcessingContext) -> None:
-    context.temporaryLayerStore().removeAllMapLayers()
+def _judge(succeeded: bool, said: str) -> None:
     if any(word in said for word in UNFORESEEN):
         raise AssertionError(said)
     if not succeeded:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 import struct
 from collections.abc import Callable
+from pathlib import Path
 
 BORDERS = (0, 7, 8, 15, 16, 31, 32, 53, 63, 64)
 NUMBERS = tuple(2**bits + step for bits in BORDERS for step in (-1, 0))
@@ -28,8 +29,18 @@ WORDS = (
     b"../" * 90,
     b"\xff\xfe",
     b"9" * 400,
+    b"-139",
+    b"0.001",
+    b"1e9",
+    b"1e18",
+    b"1e200",
+    b"-1e308",
+    b"INF",
 )
-"""Texts that take the place of a word in JSON or WKT."""
+"""Texts that take the place of a word in JSON, XML, CSV or WKT."""
+
+TEXTS = ("", ".csv", ".geojson", ".json", ".txt", ".vpc", ".xml")
+"""Endings of the names of text files, which some files of this program lack."""
 
 
 def mutate(data: bytes, rng: random.Random) -> bytes:
@@ -42,6 +53,11 @@ def mutate(data: bytes, rng: random.Random) -> bytes:
 def mutate_text(data: bytes, rng: random.Random) -> bytes:
     """Change a text file, in half of the cases word by word, so that it often stays well-formed."""
     return _replace_word(data, rng) if rng.random() < 0.5 else mutate(data, rng)
+
+
+def mutator_for(path: Path) -> Callable[[bytes, random.Random], bytes]:
+    """Return what damages a file: a text word by word as well."""
+    return mutate_text if path.suffix in TEXTS else mutate
 
 
 def _place(data: bytes, rng: random.Random) -> int:
@@ -101,7 +117,7 @@ def _repeat(data: bytes, rng: random.Random) -> bytes:
 
 def _replace_word(data: bytes, rng: random.Random) -> bytes:
     """Replace what is between two separators."""
-    cuts = [place for place, byte in enumerate(data) if byte in b',:[]{}()"']
+    cuts = [place for place, byte in enumerate(data) if byte in b',:[]{}()"<>=; \n']
     if len(cuts) < 2:
         return mutate(data, rng)
     first = rng.randrange(len(cuts) - 1)

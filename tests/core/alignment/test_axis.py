@@ -99,3 +99,27 @@ def test_a_reversed_axis_has_the_other_side():
     assert there.km[0] + back.km[0] == pytest.approx(length_along(xy)[-1] / 1000, abs=1e-6)
     assert there.offset_m[0] == pytest.approx(-back.offset_m[0], abs=1e-9)
     assert (there.side[0], back.side[0]) == ("left", "right")
+
+
+NETWORK = st.lists(
+    st.tuples(st.floats(-400, 400), st.floats(-400, 400), st.floats(0, 6), st.floats(10, 300)), min_size=1, max_size=9
+)
+
+
+@given(NETWORK, st.integers(0, 2**31))
+def test_each_place_belongs_to_the_nearest_of_many_axes(network, seed):
+    """The bounding boxes that leave out axes change nothing: the offset is the least of those along single axes."""
+    axes = [
+        axis_of(
+            [(x, y), (x + reach * np.cos(turn), y + reach * np.sin(turn)), (x + reach, y + reach)], name=str(number)
+        )
+        for number, (x, y, turn, reach) in enumerate(network)
+    ]
+    places = np.random.default_rng(seed).uniform(-600, 600, (40, 2))
+    found = locate(axes, places, HECTOMETRES)
+    alone = np.abs([locate([axis], places, HECTOMETRES).offset_m for axis in axes])
+    least = np.where(np.isnan(alone).all(axis=0), np.nan, np.nanmin(np.where(np.isnan(alone), np.inf, alone), axis=0))
+    np.testing.assert_allclose(np.abs(found.offset_m), least, atol=1e-6)
+    for number in {int(name) for name in found.axis if name}:
+        mine = np.array(found.axis) == str(number)
+        np.testing.assert_allclose(found.km[mine], locate([axes[number]], places[mine], HECTOMETRES).km, atol=1e-9)

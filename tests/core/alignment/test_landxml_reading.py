@@ -5,8 +5,11 @@ import re
 import numpy as np
 import pytest
 from rail_extract.core.alignment.landxml_reading import read_landxml
-from rail_extract.core.errors import AlignmentFileError, RailExtractError
+from rail_extract.core.errors import AlignmentFileError, Cancelled, RailExtractError
+from rail_extract.core.output.design_files import check_designs, write_designs
+from rail_extract.core.output.layers import elements_layer
 from rail_extract.core.progress import Progress, Recording
+from rail_extract.core.standards import STANDARDS
 
 METRIC = '<Units><Metric linearUnit="meter"/></Units>'
 LINE = "<Line><Start>5000 1000</Start><End>5000 1100 7</End></Line>"
@@ -204,3 +207,45 @@ def test_what_is_beside_the_alignments_does_not_fill_the_memory(read, monkeypatc
     assert len(read(text)[0].plan) == 3
     with pytest.raises(AlignmentFileError, match="any railway"):
         read(text.replace("Surfaces>", "Alignments>"))
+
+
+class Impatient(Progress):
+    """Cancels at a check."""
+
+    def __init__(self, at):
+        self.checks, self._at = 0, at
+
+    def check(self):
+        self.checks += 1
+        if self.checks == self._at:
+            raise Cancelled
+
+
+def many(count):
+    """A line of as many elements, with as many points of a profile and of cant, and as many station equations."""
+    places = [f"5000 {1000 + 10 * number}" for number in range(count + 1)]
+    lines = "".join(f"<Line><Start>{a}</Start><End>{b}</End></Line>" for a, b in zip(places, places[1:]))
+    s = [100 + 10 * number for number in range(count + 1)]
+    profile = "".join(f"<PVI>{station} {10 + number % 2 / 100}</PVI>" for number, station in enumerate(s))
+    cant = "".join(f'<CantStation station="{one}" appliedCant="{one % 7}" curvature="cw"/>' for one in s)
+    jumps = "".join(f'<StaEquation staInternal="{one + 3}" staAhead="{2 * one}"/>' for one in s[:-1])
+    further = f"{jumps}<Profile><ProfAlign>{profile}</ProfAlign></Profile><Cant>{cant}</Cant>"
+    return landxml(lines, further=further)
+
+
+def work(read, tmp_path, progress):
+    """Read a long alignment, make its layer, and write it in all formats."""
+    found = read(many(40), progress=progress)
+    check_designs(found, progress)
+    for name in ("a.xml", "a.ifc", "a.dxf"):
+        write_designs(tmp_path / name, found, STANDARDS["EN_60E1_1435"], True, "1", progress)
+    return elements_layer(found, progress)
+
+
+def test_every_step_can_be_cancelled_between_two_elements(read, tmp_path):
+    counting = Impatient(None)
+    assert len(work(read, tmp_path, counting).xyz) == 120
+    assert counting.checks > 5 * 117  # parts, kilometres, joints, rows and curves
+    for at in range(1, counting.checks, 50):
+        with pytest.raises(Cancelled):
+            work(read, tmp_path, Impatient(at))

@@ -31,6 +31,13 @@ def write_catalogue(path, *names):
     return path
 
 
+def test_a_catalogue_may_begin_with_a_byte_order_mark(tmp_path):
+    write_cloud(tmp_path / "a.las")
+    catalogue = write_catalogue(tmp_path / "all.vpc", "a.las")
+    catalogue.write_bytes(b"\xef\xbb\xbf" + catalogue.read_bytes())
+    assert readers.list_files(catalogue) == (tmp_path / "a.las",)
+
+
 def test_a_tile_that_a_catalogue_repeats_is_looked_up_once(tmp_path, monkeypatch):
     write_cloud(tmp_path / "a.las")
     looked_up, exists = [], os.path.exists

@@ -1,6 +1,7 @@
 """The commands of alignments, one after another, and what Python gives as functions of the same names."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -59,6 +60,14 @@ def test_fit_writes_elements_deviations_and_a_report(folder):
     assert len(away["s"]) == 521
     assert np.std(away["slew_mm"]) == pytest.approx(1.0, abs=0.15)
     assert "<svg" in (folder / "fit.html").read_text()
+
+
+def test_a_fit_says_how_far_the_track_lies_off_in_each_direction(folder, capsys):
+    assert main(["fit-alignment", str(folder / "tracks.gpkg"), "--elements", str(folder / "said.gpkg")]) == 0
+    away, _ = table(folder / "out.gpkg", "deviations")
+    across, height = (np.sqrt(np.nanmean(away[name] ** 2)) for name in ("slew_mm", "lift_mm"))
+    found = re.search(r"root mean square ([\d.]+) mm across, ([\d.]+) mm in height", capsys.readouterr().out)
+    assert [float(one) for one in found.groups()] == pytest.approx([across, height], abs=0.02)
 
 
 def test_a_fit_with_its_own_table_gives_the_same_elements(folder):

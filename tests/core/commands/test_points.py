@@ -148,8 +148,8 @@ def test_a_guide_across_the_tracks_is_noticed(save, tmp_path, capsys):
     ("options", "message"),
     [
         (["--only-guided"], "--only-guided needs lines to compare tracks with: choose --guide."),
-        (["--workers", "-1"], "--workers can't be -1: give a number from 0 to 1000."),
-        (["--workers", "1001"], "--workers can't be 1001: give a number from 0 to 1000."),
+        (["--workers", "-1"], "--workers can't be -1: give a number from 0 to 1,000."),
+        (["--workers", "1001"], "--workers can't be 1001: give a number from 0 to 1,000."),
         (["--rail-class", "256"], "--rail-class can't be 256: give a number from 0 to 255."),
         (["--guide", "nothing.json"], "nothing.json can't be read as a vector file: give a GeoPackage or GeoJSON"),
         (["--guide", "far.json"], "The guide has no line within 4 m of the cloud: check its place and coordinate"),
@@ -180,7 +180,7 @@ def test_a_copy_has_the_rail_that_grew_from_a_seed(raw, tmp_path, capsys):
     assert not found[STRIP.xyz[:, 1] < 0].any()
     said = capsys.readouterr()
     assert f"{found.sum()} of {len(found)} points are on rails" in said.out
-    assert "where the cloud ends" in said.err
+    assert ": at both ends, the cloud ends." in said.err
 
 
 def test_seeds_of_a_file_are_transformed(raw, tmp_path):
@@ -233,7 +233,7 @@ def test_rails_grow_and_are_extracted_in_one_call(save, tmp_path):
         (["--seed", "nan,5"], '--seed "nan,5" should be two numbers: x,y.'),
         (["--seed", "1e300,5"], '--seed "1e300,5" should be two numbers: x,y.'),
         (["--seed", "1,2"], "No seed is in the cloud"),
-        (["--seed", f"{X},{Y}", "--max-outliers", "-1"], "--max-outliers can't be -1: give a number from 0 to 1000."),
+        (["--seed", f"{X},{Y}", "--max-outliers", "-1"], "--max-outliers can't be -1: give a number from 0 to 1,000."),
         (["--seed", f"{X},{Y}", "--stops", "a.shp"], "--stops can't be a.shp: let it end in .gpkg or .dxf or .csv."),
         (["--seed", f"{X},{Y}", "--rail-class", "300"], "--rail-class can't be 300: give a number from 0 to 255."),
     ],

@@ -67,6 +67,23 @@ def test_what_is_not_an_array_of_weights_is_refused_within_little_memory(tmp_pat
         tracemalloc.stop()
 
 
+def test_an_archive_that_states_too_small_a_size_is_refused_within_little_memory(tmp_path):
+    path = tmp_path / "weights.npz"
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr(
+            "layer.9.bias.npy", npy({"descr": "<f4", "fortran_order": False, "shape": (24,)}, bytes(2**28))
+        )
+        stated = archive.infolist()[0].file_size.to_bytes(4, "little")
+    path.write_bytes(path.read_bytes().replace(stated, (224).to_bytes(4, "little")))
+    tracemalloc.start()
+    try:
+        with pytest.raises(ModelError, match="weights.npz cannot be read"):
+            load_arrays(path)
+        assert tracemalloc.get_traced_memory()[1] < 2**22
+    finally:
+        tracemalloc.stop()
+
+
 def test_arrays_by_columns_are_read_as_numpy_reads_them(tmp_path):
     array = np.asfortranarray(np.arange(6, dtype=np.float32).reshape(2, 3))
     np.savez(tmp_path / "weights.npz", here=array)

@@ -42,7 +42,7 @@ def test_function_and_command_take_what_the_toolbox_takes(name):
     ("name", "given", "said", "about"),
     [
         ("compare", {"reach": 7}, "{} can't be 7: give a number from 0.01 to 2.", "reach"),
-        ("compare", {"step": "nan"}, "{} can't be nan: give a number from 0.1 to 100000.", "step"),
+        ("compare", {"step": "nan"}, "{} can't be nan: give a number from 0.1 to 100,000.", "step"),
         ("compare", {"reference_sigma": -1}, "{} can't be -1: give 0 or more.", "reference_sigma"),
         ("compare", {"output": "a.txt"}, "{} can't be a.txt: let it end in .gpkg or .dxf or .csv.", "output"),
         ("compare", {"rails": "a.gpkg"}, "the rails of both surveys: choose {}, too.", "reference_rails"),

@@ -6,8 +6,10 @@ from rail_extract.core.clouds.las import laspy
 from rail_extract.core.clouds.points import ask
 from rail_extract.core.clouds.vpc import list_tiles
 from rail_extract.core.errors import ParameterError, RailExtractError
+from rail_extract.core.grow import seeds as many_seeds
 from rail_extract.core.grow.follow import Reason
 from rail_extract.core.grow.settings import GrowSettings
+from rail_extract.core.grow.start import find_start
 from rail_extract.core.labelling.files import Choice, plan_output
 from rail_extract.core.labelling.growing import grow_files
 from rail_extract.core.parameters import GrowParameters
@@ -72,7 +74,7 @@ def test_only_the_class_of_points_on_the_rails_changes(tmp_path):
     assert figures.cells_per_m > 30
     assert [stop.reason for stop in result.stops] == [Reason.CLOUD, Reason.CLOUD]
     assert sorted(stop.xyz[0] for stop in result.stops) == pytest.approx([500_003.5, 500_026.5], abs=1.0)
-    assert any("where the cloud ends" in text for text in progress.infos)
+    assert any(text.endswith(": at both ends, the cloud ends.") for text in progress.infos)
 
 
 def test_tiles_give_the_same_points_as_one_file(tmp_path):
@@ -116,6 +118,19 @@ def test_a_line_reaches_on_beyond_the_longest_run(tmp_path):
     whole, _ = grow(tmp_path, [source], tmp_path / "whole.las", [line], max_length_m=12.0)
     assert alone.figures.paired_m == pytest.approx(2 * 17.0, abs=4.0)
     assert whole.figures.paired_m == pytest.approx(2 * 59.0, abs=3.0)
+
+
+def test_places_of_a_line_outside_of_the_cloud_are_not_looked_at(tmp_path, monkeypatch):
+    source = save(tmp_path / "raw.las", TRACK.xyz)
+    looked_at = []
+    monkeypatch.setattr(
+        many_seeds, "find_start", lambda heads, place, own: looked_at.append(place) or find_start(heads, place, own)
+    )
+    line = CORNER[:2] + [TRACK.at(s, SPACING_M / 2) for s in (-90_000.0, 12.0, 90_000.0)]
+    result, progress = grow(tmp_path, [source], tmp_path / "new.las", [line])
+    assert result.figures.paired_m == pytest.approx(47.0, abs=2.5)
+    assert len(looked_at) < 5
+    assert not any("not on a rail" in text for text in progress.warnings)
 
 
 def test_only_rails_are_written_on_request(tmp_path):

@@ -119,4 +119,6 @@ def test_the_page_states_figures_elements_and_that_it_is_a_proposal():
     assert "<td>plan 3, arc</td><td>km 12.30000</td><td>300.00 m</td><td>R 500.00 m</td>" in page
     assert "<td>1.25 m</td>" in page
     assert "is a proposal" in page
+    warned = build_alignment_page([(alignment, deviations)], "t", {}, fitted=True, warnings=["The cant ends <early>."])
+    assert "The cant ends &lt;early&gt;." in warned
     assert "is a proposal" not in build_alignment_page([(alignment, deviations)], "t", {}, fitted=False)

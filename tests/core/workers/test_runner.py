@@ -178,9 +178,18 @@ def test_the_first_error_counts_even_if_a_later_one_comes_sooner(functions, two,
     assert not late.exists()
 
 
-def test_an_error_that_cannot_be_sent_says_what_it_was(functions, two):
-    with pytest.raises(RuntimeError, match="Odd: odd"):
+def test_an_error_that_cannot_be_sent_says_what_it_was_and_where(functions, two):
+    with pytest.raises(RuntimeError, match="Odd: odd") as caught:
         list(two.run({number: Task("", functions.fail_oddly, ()) for number in range(2)}))
+    (note,) = caught.value.__notes__
+    assert note.startswith("In a worker process:") and "in fail_oddly" in note
+
+
+def test_an_error_carries_the_traceback_of_its_worker(functions, two):
+    tasks = {number: Task("", functions.fail, (number, 0.0)) for number in range(2)}
+    with pytest.raises(RailExtractError) as caught:
+        list(two.run(tasks))
+    assert "in fail" in caught.value.__notes__[0]
 
 
 def test_workers_have_one_thread_and_what_is_printed_does_no_harm(functions, two):

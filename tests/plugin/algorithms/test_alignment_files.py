@@ -1,6 +1,7 @@
 """Export Alignment and Import Alignment in QGIS: element tables, files, axes."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -44,10 +45,10 @@ def table(*alignments, change=None):
 
 @pytest.fixture
 def exported(run_step, tmp_path):
-    def export(name, source=None, **parameters):
+    def export(name, source=None, feedback=None, **parameters):
         path = tmp_path / name
         given = {"INPUT": source or table(design()), "CRS": "EPSG:25832", "OUTPUT": path}
-        outcome = run_step("exportalignment", {**given, **parameters})
+        outcome = run_step("exportalignment", {**given, **parameters}, feedback)
         return outcome, path
 
     return export
@@ -79,6 +80,19 @@ def test_a_table_becomes_landxml_and_a_table_again(exported, imported):
     (line, *_) = plan
     assert (line["x"], line["y"]) == (578_210, 5_804_400)
     assert line.geometry().length() == pytest.approx(100.0, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("name", "lost"), [("a.xml", "standard errors"), ("a.ifc", "standard errors"), ("a.dxf", "the coordinate system")]
+)
+def test_the_log_says_what_a_file_does_not_hold(exported, new_feedback, name, lost):
+    feedback = new_feedback()
+    whole, bare = design(4), replace(design(5), cant=())
+    outcome, _ = exported(name, table(whole, bare), feedback=feedback)
+    assert outcome.ok, outcome.error
+    (said,) = [one for one in feedback.infos if "does not hold" in one]
+    assert lost in said and said.endswith("No cant of track 5.")
+    assert "No profile" not in said
 
 
 def test_axes_have_kilometres_as_m_values(exported, imported):

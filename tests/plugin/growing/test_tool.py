@@ -90,7 +90,7 @@ def test_a_click_shows_both_rails_of_the_track_and_their_ends(qgis, canvas, laye
     assert lines(seed) == [pytest.approx(23, abs=1.5)]
     assert seed.bands[-1].asGeometry().constGet().numGeometries() == 2
     assert growing.message.startswith("Followed 1")
-    assert "where the cloud ends" in growing.message
+    assert growing.message.endswith(": at both ends, the cloud ends.")
     assert growing.accept_action.isEnabled()
 
 

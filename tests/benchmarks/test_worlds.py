@@ -1,0 +1,64 @@
+"""Ten fixed worlds are extracted without a fault, and the command takes up a run where it ended."""
+
+import json
+import runpy
+import sys
+from pathlib import Path
+
+import pytest
+from rail_extract.laboratory.ruler.worlds import run
+from rail_extract.laboratory.worlds.world import CLASSIFIED, RAW, VERSION, make
+
+PROGRAM = Path(__file__).resolve().parents[2] / "benchmarks" / "worlds.py"
+
+FIXED = [(RAW, seed) for seed in (1, 6, 12, 20)] + [(CLASSIFIED, seed) for seed in (1, 4, 6, 8, 11, 20)]
+"""Small worlds of several kinds that are extracted without a fault."""
+
+
+@pytest.mark.parametrize(("cloud", "seed"), FIXED)
+def test_a_world_is_extracted_without_a_fault(cloud, seed):
+    judged = run(make(seed, cloud))
+    assert judged.faults == (), judged.figures
+    assert judged.figures["to find m"] > 50
+
+
+@pytest.fixture
+def program(monkeypatch):
+    monkeypatch.syspath_prepend(str(PROGRAM.parent))
+    yield runpy.run_path(str(PROGRAM))
+    sys.modules.pop("processes", None)
+
+
+def test_worlds_that_the_same_code_has_run_are_not_run_again(program, tmp_path):
+    def line(seed, code, version=VERSION, faults=()):
+        return json.dumps({"seed": seed, "code": code, "version": version, "faults": list(faults)})
+
+    code = program["fingerprint"]()
+    fault = {"cause": "rail not found", "silent": False}
+    (tmp_path / "raw.jsonl").write_text(
+        "\n".join([line(1, "other", faults=[fault]), line(1, code), line(2, code, faults=[fault]), '{"seed": 3'])
+    )
+    found = program["collect"](range(1, 3), RAW, tmp_path, 1)
+    assert [(one["seed"], len(one["faults"])) for one in found] == [(1, 0), (2, 1)]
+
+
+def test_a_line_of_a_world_says_what_was_drawn_and_what_came_out(program):
+    world = make(6, CLASSIFIED)
+    line = program["line_of"](world, run(world), CLASSIFIED, "code")
+    again = json.loads(json.dumps(line))
+    assert (again["seed"], again["kind"], again["version"]) == (6, CLASSIFIED, VERSION)
+    assert again["world"]["survey"] == world.survey.kind
+    assert again["found %"] == 100
+    assert again["expected"] == [2, 2]
+    assert again["within"]["n m"] == pytest.approx(again["to find m"], rel=0.1)
+
+
+def test_a_rule_is_judged_by_the_worlds_that_fail_without_it_alone(monkeypatch):
+    pytest.importorskip("skimage", reason="the plain script of the golden table needs it")
+    monkeypatch.syspath_prepend(str(PROGRAM.parent))
+    rows_of_worlds = runpy.run_path(str(PROGRAM.with_name("ablation.py")))["rows_of_worlds"]
+    outcomes = [(False, {"needed": True, "idle": False})] * 8 + [(True, {"needed": True})] * 2 + [(False, {})] * 10
+    rows = list(rows_of_worlds(["needed", "idle"], outcomes))
+    assert rows[0] == "20 worlds, 2 fail with all rules."
+    assert rows[2] == "| `needed` | 10 | 8 | 0 | 0.008 |"
+    assert rows[3] == "| `idle` | 8 | 0 | 0 | 1.000 |"
