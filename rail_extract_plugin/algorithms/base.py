@@ -45,6 +45,14 @@ from ..writing.styling import NO_PROPERTIES
 from ..writing.whole_files import write_each
 from .sentences import COMMAND_LINE, sentence_for
 
+FIGURE_DECIMALS = 3
+"""Decimals of the figures of a result: millimetres of lengths in metres, and no more than anybody reads."""
+
+
+def _rounded(value: Any) -> Any:
+    """Return a figure of a result as people read it; what is not a fraction stays as it is."""
+    return round(float(value), FIGURE_DECIMALS) + 0.0 if isinstance(value, float) else value
+
 
 class RailAlgorithm(QgsProcessingAlgorithm):
     """An algorithm of Rail Extract in the toolbox.
@@ -146,7 +154,7 @@ class RailAlgorithm(QgsProcessingAlgorithm):
             notices.run_failed.emit(feedback, type(error))
         else:
             progress.set_fraction(1)
-            return results
+            return {name: _rounded(value) for name, value in results.items()}
         # PyQt keeps what is raised here: with the error as its context, files that it refers to would stay open.
         notices.run_left.emit(sys._getframe())
         raise QgsProcessingException(reason)

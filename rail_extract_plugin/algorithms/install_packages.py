@@ -31,8 +31,8 @@ JOB = declaration.Job(
     "QGIS itself is not changed, administrator rights are not needed, and packages that are already installed are "
     "skipped. An internet connection is required.\n\n"
     "PyTorch is optional: with it, the network can use a GPU, and the network of the paper runs faster than with "
-    "OpenCV; the smaller network, which is the default, takes the same time with both. The download is about "
-    "200 MB for the processor and several GB for an Nvidia GPU.",
+    "OpenCV. With the smaller network, which is the default, a run on the sample takes as long with OpenCV. The "
+    "download is about 200 MB for the processor and several GB for an Nvidia GPU.",
     ("rail", "setup", "install", "python", "pip", "dependencies", "laspy", "opencv", "torch", "pytorch"),
     parameters=(
         Choice(

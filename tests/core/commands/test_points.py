@@ -181,7 +181,7 @@ def test_a_copy_has_the_rail_that_grew_from_a_seed(raw, tmp_path, capsys):
     assert not found[STRIP.xyz[:, 1] < 0].any()
     said = capsys.readouterr()
     assert f"{found.sum()} of {len(found)} points are on rails" in said.out
-    assert "where the cloud ends" in said.err
+    assert ": at both ends, the cloud ends." in said.err
 
 
 def test_seeds_of_a_file_are_transformed(raw, tmp_path):
