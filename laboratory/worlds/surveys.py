@@ -27,7 +27,7 @@ MAX_POINTS = 1_400_000
 
 MAX_STEPS = 2.2e-4
 """Greatest product of the distance of profiles, in metres, and that of rays, in radians: 100 points per metre of a head
-7 cm wide at 3 m. A scanner beside the tracks is three times as far away."""
+7 cm wide at 3 m, of all passes together. A scanner beside the tracks is further away."""
 
 DOWN_SHARE = 0.62
 """About the share of the rays of a full turn that hit something within the width of a world."""
@@ -119,7 +119,7 @@ def _mobile(
     profile_m, ray_rad = even_in_log(rng, 0.02, 0.12), even_in_log(rng, 0.0010, 0.0035)
     points = count * DOWN_SHARE * 2 * np.pi / ray_rad * length_m / profile_m
     coarser = max(np.sqrt(points / MAX_POINTS), 1.0)
-    coarser = min(coarser, np.sqrt((MAX_STEPS / 3 if beside else MAX_STEPS) / (profile_m * ray_rad)))
+    coarser = min(coarser, np.sqrt(count * (MAX_STEPS / 2 if beside else MAX_STEPS) / (profile_m * ray_rad)))
     first = RawScanner(
         profile_step_m=profile_m * coarser,
         ray_step_rad=ray_rad * coarser,

@@ -1,5 +1,7 @@
 """Lines in plan: chainage, parts, normals and direction, and the feet of points on them."""
 
+import pickle
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -184,3 +186,19 @@ def test_a_ring_is_closed_and_a_short_line_is_not():
     ring = arc(25.0, 50.0 * np.pi)
     assert Polyline(ring).is_closed and not Polyline(ring[:-1]).is_closed
     assert not Polyline(np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 0.0]])).is_closed
+
+
+def test_a_line_is_met_a_chord_past_its_end_and_no_farther():
+    chords = Chords.of([Polyline(np.array([[0.0, 0.0], [10.0, 0.0]]))], 0.1)
+    stations = np.array([[9.95, -1.5], [10.05, -1.5], [10.15, -1.5]])
+    _, xyz, t = chords.meet(stations, np.tile([0.0, 1.0], (3, 1)), 1.5, 0.2)
+    np.testing.assert_allclose(t, [9.95, 10.05, np.nan], atol=1e-9)
+    assert np.isnan(xyz[2]).all()
+
+
+def test_only_vertices_and_given_chainages_go_to_other_processes():
+    line = Polyline(winding(1), np.arange(40.0))
+    before = len(pickle.dumps(line))
+    line.feet(line.xy, 0.1)
+    assert len(pickle.dumps(line)) == before
+    np.testing.assert_array_equal(pickle.loads(pickle.dumps(line)).t, line.t)

@@ -78,7 +78,7 @@ def test_guides_are_proposed_and_lead_to_lines(flown, run_step, tmp_path, new_fe
     guides = list(proposed.getFeatures())
     assert proposed.crs().authid() == CRS
     length_m = sum(one["length_m"] for one in guides)
-    assert done.results["PROPOSED_LENGTH"] == pytest.approx(length_m, abs=0.001)  # each is rounded to 1 mm
+    assert done.results["PROPOSED_LENGTH"] == pytest.approx(length_m, abs=0.002)  # each is rounded to 1 mm
     assert [one["guide_id"] for one in guides] == [1, 2]
     assert all(one["score"] > 80 for one in guides)
     values = {"INPUT": path, "FOOTPRINT": 0.25, "GUIDE": proposed, "CENTERLINES": outputs["CENTERLINES"]}
