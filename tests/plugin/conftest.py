@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import sys
 import tempfile
@@ -47,6 +48,7 @@ def qgis(tmp_path_factory, temporary):
 
     Processing.initialize()
     yield application
+    gc.collect()  # objects of QGIS that refer to each other must not outlive it
     Processing.deinitialize()
     application.exitQgis()
 
