@@ -1,6 +1,6 @@
 """What tracks tell of the errors of their rails: passes of the scanner that are not aligned, and a gauge that scatters.
 
-Real tracks do not jump sideways, and are built to a gauge within a millimetre or two. See docs/method.md sections 6.7
+Real tracks do not jump sideways, and are built to a gauge within a millimetre or two. See docs/method.md sections 6.6
 and 6.11.
 """
 

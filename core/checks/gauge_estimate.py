@@ -1,6 +1,6 @@
 """Gauge and railhead width, estimated from part of the points before anything else is computed.
 
-See docs/method.md section 1.5.
+See docs/method.md section 1.3.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Lines that do not look like rails: lone ones beside tracks, those of split classes, none at all, and displaced ones.
 
-See docs/method.md section 8.10.
+See docs/method.md section 8.9.
 """
 
 from __future__ import annotations

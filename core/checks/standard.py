@@ -1,6 +1,6 @@
 """Whether the points fit the rail standard that is stated, and which standard they fit.
 
-See docs/method.md section 1.5.
+See docs/method.md section 1.3.
 """
 
 from __future__ import annotations

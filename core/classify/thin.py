@@ -1,7 +1,7 @@
 """Cells for rails that are too thin for FRPDF: drawn along the lines on which the cells of a rail are.
 
 They show the network where the rail runs and carry no measurement: as points they would cost accuracy. They depend on
-the cells within `SURROUNDINGS_M` only, and there are none where rails are dense (docs/method.md section 2.4).
+the cells within `SURROUNDINGS_M` only, and there are none where rails are dense (docs/method.md section 2.3).
 """
 
 from __future__ import annotations

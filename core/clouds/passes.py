@@ -1,7 +1,7 @@
 """Passes of the scanner: which points were scanned in one go, by the source ids and the GPS times of points.
 
 Many clouds hold several passes without an id for each. Points at one place whose times differ by more than a minute are
-of different passes. See docs/method.md section 6.7.
+of different passes. See docs/method.md section 6.6.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """The axis of a head along its line: what points show of it at each station, smoothed, and its standard error.
 
 A line is moved onto this axis, and once it is there, the same measurement states how well points support it. See
-docs/method.md sections 6.2 and 6.6.
+docs/method.md sections 6.2 and 6.5.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 A polished crown may return nothing, and a low scanner sees none: the points then form a band as narrow as their noise,
 and as high as a face, half a head off the axis. Beams from the air and dense matching of photographs blur a head to a
-ridge, which is a parabola across; its crest is the axis. See docs/method.md sections 6.8 and 6.11.
+ridge, which is a parabola across; its crest is the axis. See docs/method.md sections 6.7 and 6.10.
 """
 
 from __future__ import annotations

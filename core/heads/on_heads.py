@@ -1,7 +1,7 @@
 """Heads of whole rails: points on webs, feet and sleepers below a head are left out.
 
 In most classifications "rail" means the rail from head to foot. A line belongs on the head, so that everything else is
-left out before a raster is drawn. See docs/method.md section 1.6.
+left out before a raster is drawn. See docs/method.md section 1.4.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 A scanner to one side sees one face of a head and the corner above it, whose points pile up at that edge: whatever looks
 at offsets alone moves towards the scanner. Offset and height together show which part of the outline a point may be
-from. See docs/method.md section 6.8.
+from. See docs/method.md section 6.7.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 Where a head is covered, what lies next to it or above it is all that a line has. A rail does not step: a level that
 begins and ends with a step is not the rail's, and no vehicle is lower than the rail on which it stands. See
-docs/method.md section 6.9.
+docs/method.md section 6.8.
 """
 
 from __future__ import annotations

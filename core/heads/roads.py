@@ -1,7 +1,7 @@
 """Rails in a street next to whose heads the road is classified as rail: the head is at the end that is at gauge.
 
 The road lies level with the head, so that their points form one band and the head has a single edge, at the groove for
-the flanges. See docs/method.md section 6.10.
+the flanges. See docs/method.md section 6.9.
 """
 
 from __future__ import annotations

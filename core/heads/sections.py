@@ -1,7 +1,7 @@
 """The middle of the head at stations along a line, from the outline of the head in sections of the line.
 
 A section shows which parts of the head the scanner sees, and how far the line is off on average; the points around each
-station then show how far it is off there. See docs/method.md section 6.8.
+station then show how far it is off there. See docs/method.md section 6.7.
 """
 
 from __future__ import annotations

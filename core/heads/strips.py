@@ -1,7 +1,7 @@
 """Strips, the passes of a scanner: by how much they differ across and in height along a line, and how to align them.
 
 The position of a scanner is in error by some millimetres to centimetres that change slowly along the way. Where two
-passes show a rail, or one passes on to the next, their difference is seen. See docs/method.md section 6.7.
+passes show a rail, or one passes on to the next, their difference is seen. See docs/method.md section 6.6.
 """
 
 from __future__ import annotations

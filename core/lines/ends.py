@@ -1,4 +1,4 @@
-"""How lines end, continue across a gap by a bridge, and part (docs/method.md sections 4.8, 4.11 and 6.3)."""
+"""How lines end, continue across a gap by a bridge, and part (docs/method.md sections 4.7, 4.10 and 6.3)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Finish lines: join pieces into one, cut turns too sharp for a rail, and thin (docs/method.md sections 5.7 and 5.8).
+"""Finish lines: join pieces into one, cut turns too sharp for a rail, and thin (docs/method.md sections 5.5 and 5.6).
 
 All chords between vertices of a curve are inside it, on average by half the tolerance of thinning. The remaining
 vertices are therefore moved so that the thinned line fits the whole one best.

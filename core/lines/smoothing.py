@@ -24,10 +24,10 @@ REACH_SIGMAS = 30.0
 
 VARIANCE_FACTOR = 0.33375
 """Variance of the result for independent points with a variance of 1, in units of spacing / sigma: the integral of the
-squared equivalent kernel (docs/method.md section 5.3)."""
+squared equivalent kernel (docs/method.md section 5.2)."""
 
 END_SHIFT = 0.26
-"""Displacement of a line at a fixed end in an arc of radius R, in units of sigma² / R (docs/method.md section 5.4);
+"""Displacement of a line at a fixed end in an arc of radius R, in units of sigma² / R (docs/method.md section 5.3);
 half as much where an arc follows a straight."""
 
 _MOMENTS = 5

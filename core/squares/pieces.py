@@ -1,6 +1,6 @@
 """Pieces of rails: what a square contributes, which parts of it are new, and how a piece blends into the next.
 
-See docs/method.md section 7.3.
+See docs/method.md section 7.2.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
 The lines of a square are valid up to `HALO_M` beyond its border, so that neighbours show the same rails there. Squares
 are added one after another, and each contributes the parts of its rails that no earlier square shows. Where one piece
 continues in another, the first blends into the second over the length that both show, so that no step remains however
-the two differ. See docs/method.md section 7.3.
+the two differ. See docs/method.md section 7.2.
 """
 
 from __future__ import annotations

@@ -76,7 +76,7 @@ def clean_square(
 ) -> RailRaster:
     """Rasterize the points of a square, clean the raster with the network, and keep the tiles inside the square.
 
-    The network also sees cells that are drawn along thin rails (docs/method.md section 2.4).
+    The network also sees cells that are drawn along thin rails (docs/method.md section 2.3).
     """
     cell_m = cell_size(parameters.gauge_m, parameters.head_width_m)
     margin_m = max_passes(parameters.passes) * MARGIN * cell_m

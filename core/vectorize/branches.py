@@ -1,6 +1,6 @@
 """Where one rail leaves another, the raster shows their mean: the one runs on, and the other is led to it by a curve.
 
-See docs/method.md sections 4.11 and 4.12.
+See docs/method.md sections 4.10 and 4.11.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Rails that cross at a small angle share part of the raster; it is separated into two rails again.
 
-See docs/method.md section 4.10.
+See docs/method.md section 4.9.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Rail ends that face each other across a gap are joined by a curve that a rail could follow.
 
-See docs/method.md section 4.9.
+See docs/method.md section 4.8.
 """
 
 from __future__ import annotations

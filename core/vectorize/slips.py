@@ -2,7 +2,7 @@
 
 Each rail of a slip curve touches both rails of the crossing, inside the frogs. The raster separates the four rails only
 over the few metres in the middle, too short for their parting to be measured. A curve that touches two straight lines
-has one unknown, however, and cells far from both lines show it. See docs/method.md section 4.16.
+has one unknown, however, and cells far from both lines show it. See docs/method.md section 4.13.
 """
 
 from __future__ import annotations

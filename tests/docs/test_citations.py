@@ -45,10 +45,13 @@ def test_the_method_refers_to_sections_of_its_own():
     assert [number for number in cited(OWN_REFERENCE, text) if number not in sections(text)] == []
 
 
-def test_sections_are_numbered_in_order():
-    text = tracked()[METHOD]
-    numbers = [tuple(map(int, one.split("."))) for one in re.findall(r"^#{2,3} (\d+(?:\.\d+)?) ", text, re.MULTILINE)]
-    assert numbers == sorted(set(numbers))
+def test_sections_are_numbered_without_holes():
+    numbers = re.findall(r"^#{2,3} (\d+(?:\.\d+)?) ", tracked()[METHOD], re.MULTILINE)
+    chapter, section, expected = 0, 0, []
+    for number in numbers:
+        chapter, section = (chapter, section + 1) if "." in number else (chapter + 1, 0)
+        expected.append(f"{chapter}.{section}" if section else str(chapter))
+    assert numbers == expected
 
 
 def test_files_that_the_method_names_exist():
