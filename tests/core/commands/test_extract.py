@@ -204,7 +204,7 @@ def test_an_output_that_is_a_folder_is_refused_before_the_run(tiles, tmp_path, c
         (["--gauge", "300"], "gauge"),
         (["--max-gap", "-1"], "--max-gap"),
         (["--step", "0"], "--step"),
-        (["--workers", "100000"], "--workers can't be 100000: give a number from 0 to 1000."),
+        (["--workers", "100000"], "--workers can't be 100000: give a number from 0 to 1,000."),
         (["--iterations", "6"], "--iterations can't be 6: give a number from 0 to 5."),
         (["--smoothing-xy", "0"], "--smoothing-xy"),
         (["--rail-classes", "300"], "0 to 255"),
