@@ -62,7 +62,7 @@ def test_the_command_is_installed(installed, tmp_path):
     done = subprocess.run(
         command, check=True, cwd=tmp_path, env=_environment(installed), capture_output=True, text=True
     )
-    assert "extract rails and track centerlines" in done.stdout
+    assert "the 3D lines of the railheads and of the track centerlines" in " ".join(done.stdout.split())
     assert "synthetic" not in done.stdout  # the laboratory is not installed
 
 

@@ -37,7 +37,7 @@ def add(number, context):
 def about(context):
     print("what a library prints")
     os.system("echo and what a program prints")
-    return os.getpid(), os.environ["OMP_NUM_THREADS"]
+    return os.getpid(), os.environ.get("OMP_NUM_THREADS")
 
 def fail(number, after_s, context):
     time.sleep(after_s)
