@@ -118,9 +118,10 @@ class Places:
 def heads_of(points: RailPoints) -> RailPoints:
     """Return the points of rails without those on webs and feet, and on what lies below.
 
-    Points that were found in a raw cloud are on heads.
+    The search of a raw cloud takes what is up to a head deep below the tops of cells: where a rail is seen from one
+    side, some of its web, too. In a blunt cloud it takes ridges, whose flanks show the head and what lies below it.
     """
-    if points.found:
+    if points.found and points.blunt:
         return points
     kept = on_heads(points.xyz)
     return points if kept.all() else points.kept(kept)

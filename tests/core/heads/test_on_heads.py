@@ -1,7 +1,5 @@
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -97,11 +95,16 @@ def test_a_rail_without_a_head_is_kept():
     assert on_heads(xyz[part == FOOT]).all()
 
 
-def test_points_that_were_found_in_a_raw_cloud_are_kept():
+@pytest.mark.parametrize("found", [False, True])
+def test_a_class_and_what_was_found_in_a_sharp_cloud_lose_web_and_foot(found):
     xyz, part = rail(30.0)
-    points = RailPoints(xyz, LocalFrame(np.zeros(3)), 10)
+    points = RailPoints(xyz, LocalFrame(np.zeros(3)), 10, found=found)
     assert len(heads_of(points).xyz) < 1.01 * (part == HEAD).sum()
-    assert heads_of(replace(points, found=True)).xyz is xyz
+
+
+def test_ridges_that_were_found_in_a_blunt_cloud_are_kept():
+    xyz, _ = rail(30.0)
+    assert heads_of(RailPoints(xyz, LocalFrame(np.zeros(3)), 10, found=True, blunt=True)).xyz is xyz
 
 
 @pytest.mark.parametrize("count", [0, 1, 2, 5])
