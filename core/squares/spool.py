@@ -265,6 +265,8 @@ class Census:
 
     def add(self, code: int, xyz: np.ndarray, marks: np.ndarray, zero: LocalFrame, side_m: float, folder: Path) -> None:
         """Append points of one class, (n, 3) in units of the CRS, to the files of their squares and marks, (n,)."""
+        if not len(xyz):
+            return
         new = {"squares": {}, "checks": {}, "low": [np.inf] * 2, "high": [-np.inf] * 2}
         mine = self._classes.setdefault(code, new)
         for mark in np.unique(marks).tolist():

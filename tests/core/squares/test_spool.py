@@ -14,7 +14,7 @@ from rail_extract.core.errors import Cancelled, NoRailPointsError
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.progress import Progress
 from rail_extract.core.squares.grid import MemorySource, Square, lay_out
-from rail_extract.core.squares.spool import SpooledPoints, _fingerprint, spool
+from rail_extract.core.squares.spool import Census, SpooledPoints, _fingerprint, spool
 
 SIDE = 30.0
 
@@ -219,3 +219,11 @@ def test_the_order_of_classes_counts_where_the_first_one_holds_all_points(files)
     for merged, codes in ((False, (10, 11)), (False, (11, 10)), (True, (10, 11)), (True, (11, 10))):
         names.add(_fingerprint(replace(request, merged=merged, class_codes=codes), request.headers[0], SIDE))
     assert len(names) == 3
+
+
+def test_a_part_without_points_counts_nothing(tmp_path):
+    census, frame = Census(), LocalFrame(np.zeros(3))
+    census.add(10, np.empty((0, 3)), np.empty(0, dtype=int), frame, SIDE, tmp_path)
+    assert census.report()["classes"] == {}
+    census.add(10, np.ones((2, 3)), np.zeros(2, dtype=int), frame, SIDE, tmp_path)
+    assert list(census.report()["classes"]) == ["10"]

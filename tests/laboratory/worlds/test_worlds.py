@@ -18,7 +18,8 @@ def world(request):
 
 def test_a_world_is_a_function_of_its_seed(world):
     again = make(world.seed, "classified")
-    assert np.array_equal(again.scene.xyz, world.scene.xyz)
+    assert again.scene.xyz.shape == world.scene.xyz.shape
+    assert np.abs(again.scene.xyz - world.scene.xyz).max() < 1e-9  # rounding depends on threads and alignment
     assert np.array_equal(again.classified.classification, world.classified.classification)
     assert again.describe() == world.describe()
 
