@@ -50,7 +50,7 @@ class RailPoints:
     strips : (n,) array or None
         Number of the strip, a pass of the scanner, that each point belongs to; None if all points are of one strip.
     found : bool
-        Whether they were found in a raw cloud, on heads; a class of a file may hold whole rails.
+        Whether they were found in a raw cloud, and not by their class: in a blunt one they are whole ridges.
     blunt : bool or None
         Whether the cloud blunts heads, as its lines have shown; None before there are any.
     """
