@@ -1,0 +1,1 @@
+"""Inputs other than clouds, each checked in one place whether QGIS or the packages of a command line read it."""
