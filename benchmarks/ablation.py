@@ -193,13 +193,13 @@ SWITCHES = (
     _rule("alignment.signals.SHORT_M", 0.0),
     _rule("alignment.structure._hang_together", lambda *_: True),
     _rule("alignment.structure.SHOULDER_M", np.inf),
-    _rule("alignment.moves._united", lambda chain, *_: chain),
-    _rule("alignment.moves._widened", lambda *_: iter(())),
-    _rule("alignment.moves._between", lambda chain, *_: chain),
-    _rule("alignment.moves._joined", lambda *_: iter(())),
+    _rule("alignment.structure._united", lambda chain, *_: chain),
+    _rule("alignment.structure._widened", lambda *_: iter(())),
+    _rule("alignment.structure._between", lambda chain, *_: chain),
+    _rule("alignment.structure._joined", lambda *_: iter(())),
     _rule("alignment.layouts._snapped", lambda chain, *_: (chain, np.zeros(len(chain.p), dtype=bool))),
     _rule("alignment.noise._usual", first),
-    _rule("alignment.uncertainty._spent", lambda *_: 0.0),
+    _rule("alignment.layouts._spent", lambda *_: 0.0),
 )
 
 

@@ -268,7 +268,7 @@ ELEMENT_FIELDS = (
     Field("r_fit_m", float, "radius of an arc or a parabola as fitted; the next fit holds r1_m where you change it", 4),
     Field("s_fit_m", float, "s_from as fitted; the next fit holds s_from where you change it", 4),
 )
-"""The element table: `alignment.table` writes and reads its rows. A shapefile cuts its long names."""
+"""The element table: `files.table` writes and reads its rows. A shapefile cuts its long names."""
 
 DEVIATION_FIELDS = (
     Field("track_id", int, "number of the track"),

@@ -73,7 +73,7 @@ def _run(values: Values, progress: Progress) -> Result:
 
 def _proposed(found: Proposals) -> Result:
     """Return the proposed guides as a result."""
-    from ..output.layers import lines_layer
+    from ..files.layers import lines_layer
     from .result import Result
 
     figures = {"PROPOSED_LENGTH": found.length_m, "DENSITY": round(found.density, 1)}
@@ -83,7 +83,7 @@ def _proposed(found: Proposals) -> Result:
 
 def _fitted(survey: Survey, values: Values) -> Result:
     """Return what was found along the guides as a result."""
-    from ..output.layers import airborne_stations_layer, findings_layer, lines_layer
+    from ..files.layers import airborne_stations_layer, findings_layer, lines_layer
     from ..report.airborne import airborne_findings, airborne_page, airborne_summary
     from .result import Result
 

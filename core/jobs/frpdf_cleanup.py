@@ -12,7 +12,7 @@ from . import shared
 from .declaration import RAIL_WORDS, STEPS, Job, RasterOutput
 
 if TYPE_CHECKING:
-    from ..output.raster_file import RasterHeader
+    from ..files.raster_file import RasterHeader
     from ..progress import Progress
     from ..standards import RailStandard
     from .result import Result

@@ -22,7 +22,7 @@ def _check(values: Values) -> None:
 
 def _run(values: Values, progress: Progress) -> Result:
     """Rasterize each class."""
-    from ..output.raster_file import header_for
+    from ..files.raster_file import header_for
     from ..raster import cell_size, rasterize
     from ..squares.density import plausible
     from ..squares.grid import MemorySource

@@ -35,7 +35,7 @@ def _check(values: Values) -> None:
 def _run(values: Values, progress: Progress) -> Result:
     """Vectorize each class."""
     from ..checks.lines import warn_of_rails
-    from ..output.layers import lines_layer
+    from ..files.layers import lines_layer
     from ..squares.steps import lines_of
     from .area_points import Area, read_points_in
     from .result import Result

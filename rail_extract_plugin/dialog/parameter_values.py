@@ -36,10 +36,10 @@ if TYPE_CHECKING:
     import numpy as np
 
     from ...core.airborne.survey import Guide
-    from ...core.alignment.placed_axes import PlacedAxes
     from ...core.clouds.mask import Mask
-    from ...core.input.rail_rasters import RasterSource
+    from ...core.files.rail_rasters import RasterSource
     from ...core.jobs.lines import Lines
+    from ...core.kilometres.axes import PlacedAxes
     from ...core.progress import Progress
     from ...core.run.loop import Runner
 
@@ -199,7 +199,7 @@ class ParameterValues(Values):
         return self._once(name, lambda: self._raster(name))
 
     def _raster(self, name: str) -> RasterSource:
-        from ...core.input.rail_rasters import RasterSource
+        from ...core.files.rail_rasters import RasterSource
         from ..reading.rasters import open_with_gdal
 
         layer = self.algorithm.parameterAsRasterLayer(self.parameters, name, self.context)
@@ -236,7 +236,7 @@ class ParameterValues(Values):
         RailExtractError
             They can't be transformed, state no kilometres or contradict each other.
         """
-        from ...core.alignment.stations import Start
+        from ...core.kilometres.axes import Start
         from ..reading.axes import AxisSources, read_axes
 
         start_km = self.optional_number("START_KM")

@@ -1,4 +1,4 @@
-"""Rasters that GDAL reads, for the checks of `core.input.rail_rasters`."""
+"""Rasters that GDAL reads, for the checks of `core.files.rail_rasters`."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 from osgeo import gdal
 
-from ...core.input.rail_rasters import Block, RasterFile
-from ...core.output.raster_file import BLOCK
+from ...core.files.rail_rasters import Block, RasterFile
+from ...core.files.raster_file import BLOCK
 
 
 @contextmanager

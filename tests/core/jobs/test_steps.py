@@ -9,7 +9,7 @@ pytest.importorskip("rasterio")
 laspy = pytest.importorskip("laspy")
 
 from rail_extract.core.clouds.crs import import_pyproj  # noqa: E402
-from rail_extract.core.input.rail_rasters import RasterSource, open_with_rasterio  # noqa: E402
+from rail_extract.core.files.rail_rasters import RasterSource, open_with_rasterio  # noqa: E402
 
 HOW = {"iterations": 1, "engine": "OPENCV"}
 ROUNDED = 0.11

@@ -20,7 +20,7 @@ from qgis.core import (
     QgsRectangle,
     QgsVectorLayer,
 )
-from rail_extract.core.input.rail_rasters import RasterSource
+from rail_extract.core.files.rail_rasters import RasterSource
 from rail_extract.core.kernels import blas
 from rail_extract.core.run import processes
 from rail_extract.core.scratch import PREFIX

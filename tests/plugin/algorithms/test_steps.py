@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 from qgis.core import QgsRasterLayer
-from rail_extract.core.input.rail_rasters import RasterSource
+from rail_extract.core.files.rail_rasters import RasterSource
 from rail_extract.core.raster import cell_size
 from rail_extract.rail_extract_plugin.reading.rasters import open_with_gdal
 

@@ -1,10 +1,10 @@
-"""Files of rail rasters as GDAL writes and reads them; `tests/core/input/test_rail_rasters.py` has the checks."""
+"""Files of rail rasters as GDAL writes and reads them; `tests/core/files/test_rail_rasters.py` has the checks."""
 
 import numpy as np
 from rail_extract.core.clouds.crs import import_pyproj
+from rail_extract.core.files.rail_rasters import RasterSource
+from rail_extract.core.files.raster_file import header_for
 from rail_extract.core.frame import LocalFrame
-from rail_extract.core.input.rail_rasters import RasterSource
-from rail_extract.core.output.raster_file import header_for
 from rail_extract.core.raster import cell_size, rasterize
 from rail_extract.core.standards import STANDARDS
 from rail_extract.rail_extract_plugin.reading.rasters import open_with_gdal

@@ -1,1 +1,0 @@
-"""Inputs other than clouds, each checked in one place whether QGIS or the packages of a command line read it."""
