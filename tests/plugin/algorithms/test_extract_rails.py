@@ -204,7 +204,10 @@ def test_findings_are_the_table_of_the_report(run, write_cloud, track, tmp_path)
     assert layer.crs().authid() == "EPSG:32643"
     assert layer.wkbType() == 1002  # LineStringZ
     assert [finding["finding"] for finding in findings] == [1, 2]
-    assert [finding["reason"] for finding in findings] == ["gauge off by more than 10 mm", "a rail has no points"]
+    assert [finding["reason"] for finding in findings] == [
+        "gauge off by more than 10 mm and 4 standard errors",
+        "a rail has no points",
+    ]
     wide, bare = findings
     assert (wide["from_m"], wide["to_m"]) == pytest.approx((20, 30), abs=2)
     assert wide["gauge_mm"] == pytest.approx(1455, abs=3)  # where it is widest
