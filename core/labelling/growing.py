@@ -17,9 +17,8 @@ from ..classify.guide import Guide
 from ..clouds.points import Request
 from ..disk import writing
 from ..errors import OffCloudError, OffRailError
-from ..grow.growth import Growth, Stop
+from ..grow.growth import Growth, Growths, Stop
 from ..grow.heads import OnHeads
-from ..grow.seeds import Growths
 from ..grow.settings import GrowSettings
 from ..polyline import Polyline
 from ..progress import SILENT, Progress
@@ -59,26 +58,17 @@ def grow_files(
         Files, `standards.SEARCHED_CLASSES` classes and extent.
     seeds : sequence of (k, 2) array
         Places on railheads, k = 1, or lines along them, in units of the CRS.
-    settings : GrowSettings
-    choice : Choice
     output : Output
         From `files.plan_output`, for the files of the request.
     folder : Path
         Existing folder for temporary files, 36 bytes per point within reach; the caller removes it.
-    runner : Runner
-        Writes the files.
-    progress : Progress
 
     Raises
     ------
-    CloudError
-        A file is damaged.
-    DiskError
-        The disk is full, or another program has changed an output.
-    ParameterError
-        No seed is in the cloud.
-    RailExtractError
-        No seed is on a rail.
+    CloudError, DiskError
+        See `files.classify_files`.
+    OffCloudError, OffRailError
+        No seed is in the cloud, or on a rail.
     """
     growing, rewriting = progress.divide((7.0, 3.0))
     labels = Labels(request, folder)
@@ -151,12 +141,8 @@ class Cloud:
 
     Parameters
     ----------
-    request : Request
     places : (k, 2) array
         Seeds, metres from the zero of the coordinate system.
-    settings : GrowSettings
-    folder : Path
-    progress : Progress
     """
 
     def __init__(
@@ -177,13 +163,7 @@ class Cloud:
 
 
 def _in_cloud(request: Request, seeds: Sequence[np.ndarray]) -> list[np.ndarray]:
-    """Return the places of each seed, (k, 2), that may be in the cloud.
-
-    Raises
-    ------
-    OffCloudError
-        None is.
-    """
+    """Return the places of each seed, (k, 2), that may be in the cloud; refuse seeds of which none is."""
     boxes = [box_of(request, [header.extent]) for header in request.headers]
     found = [seed[_inside(seed, boxes)] for seed in seeds]
     if not any(map(len, found)):

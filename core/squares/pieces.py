@@ -41,7 +41,6 @@ class SquareRails:
 
     Attributes
     ----------
-    square : Square
     rails : tuple of RailLine
         In local metres of the square, cut `HALO_M` outside its border; rails without any length inside are left out.
     nodes : (n, 2) array
