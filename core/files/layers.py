@@ -32,12 +32,11 @@ from ..report import Finding, list_findings
 from .table import rows
 
 if TYPE_CHECKING:
-    from ..airborne.proposals import ProposedGuide
     from ..airborne.survey import AirborneLine, AirborneTrack
     from ..comparison.tracks import TrackComparison
     from ..grow.growth import Stop
 
-    Line = Union[RailLine, Centerline, Finding, AirborneLine, ProposedGuide]
+    Line = Union[RailLine, Centerline, Finding, AirborneLine]
 
 
 @dataclass(frozen=True)
