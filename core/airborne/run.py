@@ -1,4 +1,4 @@
-"""What every step of a run along guides, or of a search for guides, is given."""
+"""What every step of a run along guides is given."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Run:
     request : Request
         Files, classes and extent.
     folder : Path
-        Folder for points, 28 bytes for each around the guides and 15 for each that is searched; the caller removes it.
+        Folder for points, 28 bytes for each around the guides; the caller removes it.
     runner : Runner
         Executes one task per file and one per square.
     """

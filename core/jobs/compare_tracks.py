@@ -69,7 +69,7 @@ def _check(values: Values) -> None:
 def _run(values: Values, progress: Progress) -> Result:
     """Read both surveys and compare them."""
     from ..comparison.tracks import compare_surveys, doubts_of
-    from ..output.layers import differences_layer
+    from ..files.layers import differences_layer
     from ..report.comparison import build_comparison, describe_shift, verdict_on
     from .result import Result
 

@@ -30,8 +30,8 @@ if TYPE_CHECKING:
     import numpy as np
 
     from ..airborne.survey import Guide
-    from ..alignment.placed_axes import PlacedAxes
     from ..clouds.points import Request
+    from ..kilometres.axes import PlacedAxes
     from ..progress import Progress
     from ..run.loop import Runner
     from .lines import Lines

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..alignment.deviations import Deviations
 from ..alignment.elements import Alignment, CantElement, Element, PlanElement, VerticalElement
-from ..alignment.equations import Piece, stations_of
+from ..alignment.stations import StationRange, stations_of
 from .markup import figure, largest, legend, made, metres, page, rms, section, table, tag, text, tiles
 from .origin import stated
 from .plots import LEFT, SPACE, TICKS_ACROSS, WIDTH, Curve, Frame, Panel, across, bottom_of, broken, round_up
@@ -269,12 +269,12 @@ def _words(one: PlanElement) -> str:
 def _axis(alignment: Alignment, row: tuple[float, float], top: float, bottom: float) -> Iterator[str]:
     """Draw the kilometres, or the metres along the track where they are unknown, through all panels."""
     stations = stations_of(alignment)
-    pieces = stations.pieces if stations else (Piece(0.0, 0.0),)
+    pieces = stations.pieces if stations else (StationRange(0.0, 0.0),)
     name = "km" if stations else "m"
     yield tag("text", text(name), x=LEFT - 8, y=SPACE - 8, class_="tick end")
     yield tag("text", text(name), x=LEFT - 8, y=bottom + 16, class_="tick end")
     step = round_up((row[1] - row[0]) / TICKS_ACROSS)
-    for piece, after in zip(pieces, [*pieces[1:], Piece(np.inf, 0.0)]):
+    for piece, after in zip(pieces, [*pieces[1:], StationRange(np.inf, 0.0)]):
         start, end = max(piece.s, row[0]), min(after.s, row[1])
         if piece.s > row[0] and piece.s < row[1]:
             yield tag("line", **_vertical(piece.s, row, top, bottom), class_="jump")

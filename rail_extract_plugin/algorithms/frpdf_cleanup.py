@@ -14,7 +14,7 @@ from ..writing.layers import write_raster
 from .base import RailAlgorithm
 
 if TYPE_CHECKING:
-    from ...core.output.raster_file import RasterHeader
+    from ...core.files.raster_file import RasterHeader
 
 READING, WRITING = 0.05, 0.95
 """Fractions of the progress bar at which the network starts and ends."""

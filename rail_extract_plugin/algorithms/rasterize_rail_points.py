@@ -40,8 +40,8 @@ class RasterizeRailPoints(RailAlgorithm):
 
     def compute(self, job: Job, values: ParameterValues, progress: Progress) -> dict[str, Any]:
         """Rasterize each class, then write the file."""
+        from ...core.files.raster_file import header_for
         from ...core.jobs.track_inputs import SQUARE_M
-        from ...core.output.raster_file import header_for
         from ...core.raster import cell_size, rasterize
         from ...core.squares.density import plausible
         from ...core.squares.grid import MemorySource

@@ -16,7 +16,7 @@ from ..writing.layers import write_layer
 from .base import RailAlgorithm
 
 if TYPE_CHECKING:
-    from ...core.output.raster_file import RasterHeader
+    from ...core.files.raster_file import RasterHeader
     from ...core.rails import RailLine
 
 READING = 0.3
@@ -48,8 +48,8 @@ class VectorizeRails(RailAlgorithm):
         """Vectorize each class, then write the lines."""
         from ...core.checks.lines import warn_of_rails
         from ...core.fields import RAILS
+        from ...core.files.layers import lines_layer
         from ...core.jobs.area_points import Area, read_points_in
-        from ...core.output.layers import lines_layer
         from ...core.squares.steps import lines_of
         from ..reading.geotiff import read_rasters
         from ..reading.rasters import moved

@@ -36,10 +36,10 @@ if TYPE_CHECKING:
     import numpy as np
 
     from ...core.airborne.survey import Guide
-    from ...core.alignment.placed_axes import PlacedAxes
     from ...core.clouds.mask import Mask
+    from ...core.files.raster_file import RasterHeader
     from ...core.jobs.lines import Lines
-    from ...core.output.raster_file import RasterHeader
+    from ...core.kilometres.axes import PlacedAxes
     from ...core.progress import Progress
     from ...core.run.loop import Runner
 
@@ -239,7 +239,7 @@ class ParameterValues(Values):
         RailExtractError
             They can't be transformed, state no kilometres or contradict each other.
         """
-        from ...core.alignment.stations import Start
+        from ...core.kilometres.axes import Start
         from ..reading.axes import AxisSources, read_axes
 
         start_km = self.optional_number("START_KM")

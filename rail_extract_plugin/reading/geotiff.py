@@ -12,8 +12,8 @@ from osgeo import gdal
 
 from ...core.clouds.crs import parse_crs, units
 from ...core.errors import RasterError
+from ...core.files.raster_file import BLOCK, EXTENT_TAG, GAUGE_TAG, HEAD_TAG, MODEL_TAG, NO_DATA, RasterHeader
 from ...core.frame import LocalFrame
-from ...core.output.raster_file import BLOCK, EXTENT_TAG, GAUGE_TAG, HEAD_TAG, MODEL_TAG, NO_DATA, RasterHeader
 from ...core.progress import SILENT, Progress
 from ...core.raster import RailRaster
 from ...core.standards import RAIL_CLASS, is_class

@@ -6,9 +6,9 @@ import math
 from dataclasses import replace
 
 from ...core.errors import RasterError
+from ...core.files.raster_file import RasterHeader
 from ...core.frame import LocalFrame
 from ...core.frpdf.models import MODELS, Model, choose
-from ...core.output.raster_file import RasterHeader
 from ...core.raster import RailRaster, cell_size
 from ...core.standards import RailStandard
 

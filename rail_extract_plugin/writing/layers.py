@@ -39,9 +39,9 @@ from .whole_files import write_whole
 if TYPE_CHECKING:
     import numpy as np
 
+    from ...core.files.layers import Layer
+    from ...core.files.raster_file import RasterHeader
     from ...core.frame import LocalFrame
-    from ...core.output.layers import Layer
-    from ...core.output.raster_file import RasterHeader
     from ...core.raster import RailRaster
 
 KINDS = {int: INTEGER, float: REAL, str: TEXT}
@@ -279,7 +279,7 @@ def _exchange(
     frame: LocalFrame,
 ) -> dict[str, str]:
     """Write features for other programs; QGIS loads the file if the user wants that."""
-    from ...core.output.exchange import Shape, write_shapes
+    from ...core.files.exchange import Shape, write_shapes
 
     destination, value = values.algorithm.destinations[name], values.parameters.get(name)
     shapes = (

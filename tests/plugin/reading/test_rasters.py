@@ -7,10 +7,10 @@ import pytest
 from osgeo import gdal
 from rail_extract.core.clouds.crs import import_pyproj
 from rail_extract.core.errors import ModelError, ParameterError, RasterError
+from rail_extract.core.files import raster_file
+from rail_extract.core.files.raster_file import header_for, on_one_grid
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.frpdf.cleanup import clean
-from rail_extract.core.output import raster_file
-from rail_extract.core.output.raster_file import header_for, on_one_grid
 from rail_extract.core.raster import TILE, cell_size, rasterize
 from rail_extract.core.standards import STANDARDS
 from rail_extract.core.vectorize import vectorize
