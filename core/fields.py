@@ -165,6 +165,7 @@ DIFFERENCE_FIELDS = (
     Field("shift_mm", float, "part of across_mm that is the constant shift, millimetres", 1),
     Field("shiftz_mm", float, "part of height_mm that is the constant shift, millimetres", 1),
     Field("moved", int, "1 where the line has moved by more than three standard errors, across or in height; else 0"),
+    Field("shifted", int, "1 where the constant shift alone exceeds three standard errors; else 0"),
 )
 """All differences are those of the other survey from the reference."""
 

@@ -50,7 +50,7 @@ ALIGNMENT_STYLE = """
 svg .frame { fill: none; stroke: var(--line); }
 svg .design { fill: none; stroke: #f4a261; stroke-width: 5; stroke-linejoin: round; opacity: 0.75; }
 svg .jump { stroke: var(--unsure); stroke-width: 1.4; stroke-dasharray: 4 3; }
-svg.alignment { margin: 0 0 14px; break-inside: avoid; }
+svg.alignment { margin-bottom: 14px; }
 svg rect.element { stroke: var(--paper); stroke-width: 1; }
 svg rect.line { fill: #b0bec5; }
 svg rect.clothoid { fill: #f8bf7f; }
@@ -61,9 +61,8 @@ i.element { height: 10px; }
 i.line { background: #b0bec5; }
 i.clothoid { background: #f8bf7f; }
 i.arc { background: #90bdf0; }
-@page { size: A4 landscape; margin: 12mm; }
-@media print { main { max-width: none; padding: 0; } section { break-inside: auto; }
-               * { print-color-adjust: exact; -webkit-print-color-adjust: exact; } }
+@page { size: A4 landscape; }
+@media print { section { break-inside: auto; } }
 """
 """Rules besides those of all pages."""
 
