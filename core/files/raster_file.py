@@ -1,6 +1,6 @@
 """Layout of the files that hold rail rasters: GeoTIFFs with one band per class, of which only filled blocks are stored.
 
-The plugin reads and writes these files with GDAL, the command line writes them with rasterio.
+The plugin writes these files with GDAL, the command line with rasterio; `rail_rasters` reads them.
 """
 
 from __future__ import annotations
@@ -224,7 +224,7 @@ def write_rasters(path: Path, header: RasterHeader, rasters: Sequence[RailRaster
         "bigtiff": "IF_SAFER",
     }
     try:
-        with _own_proj_data(), rasterio.Env(), rasterio.open(path, "w", **layout) as file:
+        with own_proj_data(), rasterio.Env(), rasterio.open(path, "w", **layout) as file:
             file.update_tags(**header.tags)
             for band, (code, raster) in enumerate(zip(header.class_codes, rasters), start=1):
                 file.set_band_description(band, str(code))
@@ -237,7 +237,7 @@ def write_rasters(path: Path, header: RasterHeader, rasters: Sequence[RailRaster
 
 
 @contextmanager
-def _own_proj_data() -> Iterator[None]:
+def own_proj_data() -> Iterator[None]:
     """Let rasterio find the data of its own PROJ: the variables may name those of QGIS, which is another version."""
     hidden = {name: os.environ.pop(name) for name in ("PROJ_DATA", "PROJ_LIB") if name in os.environ}
     try:

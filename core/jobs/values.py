@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
     from ..airborne.survey import Guide
     from ..clouds.points import Request
+    from ..files.rail_rasters import RasterSource
     from ..kilometres.axes import PlacedAxes
     from ..progress import Progress
     from ..run.loop import Runner
@@ -134,6 +135,10 @@ class Values(ABC):
     @abstractmethod
     def cloud(self, name: str = "INPUT") -> CloudSource:
         """Return the files of a cloud, and which of their points count."""
+
+    @abstractmethod
+    def raster(self, name: str) -> RasterSource:
+        """Return a file of rail rasters."""
 
     @abstractmethod
     def extent(self, crs_wkt: str | None) -> Bounds | None:

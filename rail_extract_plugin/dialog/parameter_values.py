@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
     from ...core.airborne.survey import Guide
     from ...core.clouds.mask import Mask
-    from ...core.files.raster_file import RasterHeader
+    from ...core.files.rail_rasters import RasterSource
     from ...core.jobs.lines import Lines
     from ...core.kilometres.axes import PlacedAxes
     from ...core.progress import Progress
@@ -194,23 +194,20 @@ class ParameterValues(Values):
         """Return the file of an output; QGIS chooses the name of a temporary one during the run."""
         return self.algorithm.parameterAsFileOutput(self.parameters, name, self.context)
 
-    def raster(self, name: str) -> tuple[Path, RasterHeader]:
-        """Return the file of a raster and its header.
+    def raster(self, name: str) -> RasterSource:
+        """Return a rail raster, whose header is read in the main thread."""
+        return self._once(name, lambda: self._raster(name))
 
-        Raises
-        ------
-        RasterError
-            The value is not a rail raster in a file.
-        """
-        from ..reading.geotiff import read_header
+    def _raster(self, name: str) -> RasterSource:
+        from ...core.files.rail_rasters import RasterSource
+        from ..reading.rasters import open_with_gdal
 
         layer = self.algorithm.parameterAsRasterLayer(self.parameters, name, self.context)
         if layer is None:
             raise RasterError(f"{name} is not a readable raster: give the output of Rasterize Rail Points.")
-        path = Path(layer.source())
-        header = read_header(path)
-        prepare_system(header.frame.crs_wkt)
-        return path, header
+        source = RasterSource(Path(layer.source()), open_with_gdal)
+        prepare_system(source.header.frame.crs_wkt)
+        return source
 
     def _lines_source(self, name: str) -> QgsProcessingFeatureSource:
         """Return a line layer.

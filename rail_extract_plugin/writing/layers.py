@@ -28,7 +28,7 @@ from qgis.core import (
 from ...core.disk import Destination
 from ...core.errors import RailExtractError
 from ...core.fields import PLACES, UNKNOWN_IN_METRES, Field, Product
-from ...core.progress import SILENT, Progress
+from ...core.progress import Progress
 from ..compat import INTEGER, REAL, TEXT, field
 from ..dialog.parameter_values import ParameterValues
 from ..systems import lost_part, system
@@ -177,7 +177,7 @@ def layer_writers(
 
 
 def write_raster(
-    values: ParameterValues, name: str, header: RasterHeader, rasters: Sequence[RailRaster], progress: Progress = SILENT
+    values: ParameterValues, name: str, header: RasterHeader, rasters: Sequence[RailRaster], progress: Progress
 ) -> dict[str, str]:
     """Write rail rasters, one per class, to an output.
 
@@ -194,7 +194,7 @@ def write_raster(
     dict of str to str
         The path of the file by the name of the output; empty if the user skipped it.
     """
-    from ..reading.geotiff import write_rasters
+    from .geotiff import write_rasters
 
     if not values.wanted(name):
         return {}
