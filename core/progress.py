@@ -249,6 +249,16 @@ def counted(count: int, one: str, many: str = "") -> str:
     return f"{count:,} {one if count == 1 else many or one + 's'}"
 
 
+def written(value: float, form: str = ".1f") -> str:
+    """Write a number, for messages; what rounds to 0 is 0, without a minus.
+
+    >>> written(-1.26), written(-0.04), written(-0.04, "+.1f")
+    ('-1.3', '0.0', '+0.0')
+    """
+    rounded = f"{value:{form}}"
+    return rounded if rounded.strip("+-0.") else f"{0.0:{form}}"
+
+
 SILENT = Progress()
 
 

@@ -11,17 +11,28 @@ import numpy as np
 import pyogrio
 import shapely
 
-from ..alignment.placed_axes import AXIS_IN_DEGREES, NAME_FIELDS, PlacedAxes, check_jumps, km_of, post_field
-from ..alignment.stationing import Jump
-from ..alignment.stations import Axes, AxisLine, Post, Start, make_axes
 from ..clouds.crs import is_geographic, parse_crs, units
 from ..design_places import are_places
 from ..disk import Destination
 from ..errors import CrsError, MissingError, ParameterError
 from ..fields import EXTENT_FIELDS, STATION_FIELDS, Field
+from ..files.geopackage import geometries_in
+from ..files.writing import column_of, write_table
 from ..jobs.shared import DECREASING
-from ..output.geopackage import geometries_in
-from ..output.writing import column_of, write_table
+from ..kilometres.axes import (
+    AXIS_IN_DEGREES,
+    NAME_FIELDS,
+    Axes,
+    AxisLine,
+    PlacedAxes,
+    Post,
+    Start,
+    check_jumps,
+    km_of,
+    make_axes,
+    post_field,
+)
+from ..kilometres.stationing import Jump
 from ..progress import Progress
 from ..rails import Kilometres
 from .vectors import LAYER, Features, explained, read_features

@@ -10,10 +10,10 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from ..alignment.km_text import HECTOMETRES, NOTATIONS
 from ..disk import Destination, writing
 from ..errors import ParameterError
 from ..jobs.shared import DECREASING, INCREASING
+from ..kilometres.text import HECTOMETRES, NOTATIONS
 from ..progress import Progress
 
 

@@ -49,7 +49,7 @@ def _run(values: Values, progress: Progress) -> Result:
     """Fit each track."""
     from ..alignment.fit import fit_tracks
     from ..fields import DEVIATIONS
-    from ..output.layers import elements_layer, stations_layer
+    from ..files.layers import elements_layer, stations_layer
     from ..progress import Recording
     from ..report import build_alignment_page
     from .reading import read_elements, read_tracks

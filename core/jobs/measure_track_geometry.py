@@ -43,7 +43,7 @@ def _stated(values: Values) -> RailStandard | None:
 
 def _run(values: Values, progress: Progress) -> Result:
     """Measure each track."""
-    from ..output.layers import network_makers
+    from ..files.layers import network_makers
     from ..rails import RailNetwork
     from ..report import Origin, summary
     from ..squares.remeasuring import measure_rails

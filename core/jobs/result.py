@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any
 
 from ..disk import Destination
 from ..errors import ParameterError
-from ..output.layers import Layer
+from ..files.layers import Layer
 
 if TYPE_CHECKING:
     import geopandas
 
+    from ..files.raster_file import RasterHeader
     from ..frame import LocalFrame
-    from ..output.raster_file import RasterHeader
     from ..raster import RailRaster
 
     Rasters = tuple[RasterHeader, Sequence[RailRaster]]
@@ -83,7 +83,7 @@ class Result:
         """
         geopandas = package("geopandas")
         (written,) = self._made([layer])
-        from ..output.writing import shapes_of
+        from ..files.writing import shapes_of
 
         columns = dict(zip((one.name for one in written.product.fields), written.written_columns()))
         return geopandas.GeoDataFrame(columns, geometry=shapes_of(written, self.frame), crs=self.frame.crs_wkt or None)
@@ -110,7 +110,7 @@ class Result:
             raise ParameterError(f"{Path(path).name} can't be written: let the name end in {' or '.join(FORMATS)}.")
         names = list(self.layers) if layer is None and suffix == ".gpkg" else [layer or next(iter(self.layers))]
         made = self._made(names)
-        from ..output.writing import write_layers
+        from ..files.writing import write_layers
 
         write_layers(made, Destination.at(Path(path)), self.frame)
 

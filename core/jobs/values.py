@@ -30,8 +30,9 @@ if TYPE_CHECKING:
     import numpy as np
 
     from ..airborne.survey import Guide
-    from ..alignment.placed_axes import PlacedAxes
     from ..clouds.points import Request
+    from ..files.rail_rasters import RasterSource
+    from ..kilometres.axes import PlacedAxes
     from ..progress import Progress
     from ..run.loop import Runner
     from .lines import Lines
@@ -134,6 +135,10 @@ class Values(ABC):
     @abstractmethod
     def cloud(self, name: str = "INPUT") -> CloudSource:
         """Return the files of a cloud, and which of their points count."""
+
+    @abstractmethod
+    def raster(self, name: str) -> RasterSource:
+        """Return a file of rail rasters."""
 
     @abstractmethod
     def extent(self, crs_wkt: str | None) -> Bounds | None:

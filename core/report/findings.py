@@ -60,7 +60,7 @@ class Doubt:
 
 
 UNSUPPORTED = Doubt("unsupported", "a rail has no points")
-OFF_GAUGE = Doubt("offgauge", f"gauge off by more than {GAUGE_OFF_MM:g} mm")
+OFF_GAUGE = Doubt("offgauge", f"gauge off by more than {GAUGE_OFF_MM:g} mm and {GAUGE_SIGMAS:g} standard errors")
 UNSURE = Doubt("unsure", f"standard error above {UNSURE_MM:g} mm across or in height")
 DOUBTS = (UNSUPPORTED, OFF_GAUGE, UNSURE)
 """In order of severity; a place counts under the first that applies."""
@@ -295,11 +295,16 @@ def _examine_track(
     nominal_mm = min((1000 * gauge_m for gauge_m in gauges_m), key=lambda gauge: abs(gauge - line.gauge_mm))
     with np.errstate(invalid="ignore"):
         unsupported = geometry.bridged | np.isnan(geometry.gauge_mm)
-        least_mm = np.fmax(GAUGE_OFF_MM, GAUGE_SIGMAS * geometry.sigma_mm)
-        off = ~unsupported & (np.abs(geometry.gauge_mm - nominal_mm) > least_mm)
+        off = ~unsupported & (gauge_off(geometry, nominal_mm) > GAUGE_OFF_MM)
         unsure = ~unsupported & ~off & (np.fmax(geometry.sigma_mm, geometry.sigmaz_mm) > UNSURE_MM)
     doubtful = {UNSUPPORTED: unsupported, OFF_GAUGE: off, UNSURE: unsure}
     return TrackFindings(line, geometry, nominal_mm, doubtful, tuple(steps))
+
+
+def gauge_off(geometry: TrackGeometry, nominal_mm: float) -> np.ndarray:
+    """Return the deviations from a gauge at the stations, (n,) mm: 0 where they may be errors, NaN where unknown."""
+    off_mm = np.abs(geometry.gauge_mm - nominal_mm)
+    return np.where(off_mm <= GAUGE_SIGMAS * geometry.sigma_mm, 0.0, off_mm)
 
 
 def _places(geometry: TrackGeometry, doubt: Doubt, doubtful: np.ndarray, merge_m: float) -> Iterator[Place]:

@@ -21,7 +21,7 @@ from ..writing.layers import copies, fields, write_copy
 from .base import RailAlgorithm
 
 if TYPE_CHECKING:
-    from ...core.alignment.placed_axes import PlacedAxes
+    from ...core.kilometres.axes import PlacedAxes
 
 LOCATING = 0.9
 """Fraction of the progress bar at which the kilometres are known."""

@@ -36,10 +36,10 @@ if TYPE_CHECKING:
     import numpy as np
 
     from ...core.airborne.survey import Guide
-    from ...core.alignment.placed_axes import PlacedAxes
     from ...core.clouds.mask import Mask
+    from ...core.files.rail_rasters import RasterSource
     from ...core.jobs.lines import Lines
-    from ...core.output.raster_file import RasterHeader
+    from ...core.kilometres.axes import PlacedAxes
     from ...core.progress import Progress
     from ...core.run.loop import Runner
 
@@ -194,23 +194,20 @@ class ParameterValues(Values):
         """Return the file of an output; QGIS chooses the name of a temporary one during the run."""
         return self.algorithm.parameterAsFileOutput(self.parameters, name, self.context)
 
-    def raster(self, name: str) -> tuple[Path, RasterHeader]:
-        """Return the file of a raster and its header.
+    def raster(self, name: str) -> RasterSource:
+        """Return a rail raster, whose header is read in the main thread."""
+        return self._once(name, lambda: self._raster(name))
 
-        Raises
-        ------
-        RasterError
-            The value is not a rail raster in a file.
-        """
-        from ..reading.geotiff import read_header
+    def _raster(self, name: str) -> RasterSource:
+        from ...core.files.rail_rasters import RasterSource
+        from ..reading.rasters import open_with_gdal
 
         layer = self.algorithm.parameterAsRasterLayer(self.parameters, name, self.context)
         if layer is None:
             raise RasterError(f"{name} is not a readable raster: give the output of Rasterize Rail Points.")
-        path = Path(layer.source())
-        header = read_header(path)
-        prepare_system(header.frame.crs_wkt)
-        return path, header
+        source = RasterSource(Path(layer.source()), open_with_gdal)
+        prepare_system(source.header.frame.crs_wkt)
+        return source
 
     def _lines_source(self, name: str) -> QgsProcessingFeatureSource:
         """Return a line layer.
@@ -239,7 +236,7 @@ class ParameterValues(Values):
         RailExtractError
             They can't be transformed, state no kilometres or contradict each other.
         """
-        from ...core.alignment.stations import Start
+        from ...core.kilometres.axes import Start
         from ..reading.axes import AxisSources, read_axes
 
         start_km = self.optional_number("START_KM")

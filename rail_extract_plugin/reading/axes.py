@@ -18,20 +18,24 @@ from qgis.core import (
     QgsWkbTypes,
 )
 
-from ...core.alignment.placed_axes import (
+from ...core.clouds.crs import parse_crs, units
+from ...core.errors import CrsError, MissingError
+from ...core.kilometres.axes import (
     AHEAD,
     AXIS_IN_DEGREES,
     BACK,
     NAME_FIELDS,
+    Axes,
+    AxisLine,
     PlacedAxes,
+    Post,
+    Start,
     check_jumps,
     km_of,
+    make_axes,
     post_field,
 )
-from ...core.alignment.stationing import Jump
-from ...core.alignment.stations import Axes, AxisLine, Post, Start, make_axes
-from ...core.clouds.crs import parse_crs, units
-from ...core.errors import CrsError, MissingError
+from ...core.kilometres.stationing import Jump
 from .line_layers import CHORD_TOLERANCE_M, GEOMETRY_AS_IT_IS, transform, value_of, wkt_of
 
 

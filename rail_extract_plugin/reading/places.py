@@ -17,9 +17,9 @@ from qgis.core import (
     QgsWkbTypes,
 )
 
-from ...core.alignment.placed_axes import PlacedAxes
 from ...core.design_places import are_places
 from ...core.fields import EXTENT_FIELDS, STATION_FIELDS, Field
+from ...core.kilometres.axes import PlacedAxes
 from ...core.progress import Progress
 from ...core.rails import Kilometres
 from ..compat import TEXT

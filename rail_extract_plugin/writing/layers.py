@@ -28,7 +28,7 @@ from qgis.core import (
 from ...core.disk import Destination
 from ...core.errors import RailExtractError
 from ...core.fields import PLACES, UNKNOWN_IN_METRES, Field, Product
-from ...core.progress import SILENT, Progress
+from ...core.progress import Progress
 from ..compat import INTEGER, REAL, TEXT, field
 from ..dialog.parameter_values import ParameterValues
 from ..systems import lost_part, system
@@ -39,9 +39,9 @@ from .whole_files import write_whole
 if TYPE_CHECKING:
     import numpy as np
 
+    from ...core.files.layers import Layer
+    from ...core.files.raster_file import RasterHeader
     from ...core.frame import LocalFrame
-    from ...core.output.layers import Layer
-    from ...core.output.raster_file import RasterHeader
     from ...core.raster import RailRaster
 
 KINDS = {int: INTEGER, float: REAL, str: TEXT}
@@ -177,7 +177,7 @@ def layer_writers(
 
 
 def write_raster(
-    values: ParameterValues, name: str, header: RasterHeader, rasters: Sequence[RailRaster], progress: Progress = SILENT
+    values: ParameterValues, name: str, header: RasterHeader, rasters: Sequence[RailRaster], progress: Progress
 ) -> dict[str, str]:
     """Write rail rasters, one per class, to an output.
 
@@ -194,7 +194,7 @@ def write_raster(
     dict of str to str
         The path of the file by the name of the output; empty if the user skipped it.
     """
-    from ..reading.geotiff import write_rasters
+    from .geotiff import write_rasters
 
     if not values.wanted(name):
         return {}
@@ -279,7 +279,7 @@ def _exchange(
     frame: LocalFrame,
 ) -> dict[str, str]:
     """Write features for other programs; QGIS loads the file if the user wants that."""
-    from ...core.output.exchange import Shape, write_shapes
+    from ...core.files.exchange import Shape, write_shapes
 
     destination, value = values.algorithm.destinations[name], values.parameters.get(name)
     shapes = (

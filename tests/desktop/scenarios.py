@@ -9,10 +9,12 @@ from collections.abc import Iterable, Iterator
 from functools import partial
 from pathlib import Path
 
+import processing
 from driver import Driver, algorithm, choose, close, install, later, open_batch, open_dialog, press_run, window
 from qgis.core import (
     QgsApplication,
     QgsCoordinateReferenceSystem,
+    QgsExpression,
     QgsLayerTree,
     QgsPointCloudLayer,
     QgsPointXY,
@@ -463,6 +465,28 @@ def onwards(driver: Driver) -> Iterator:
     driver.keep("colours", [one.symbol().color().name() for one in stationed.renderer().categories()])
     driver.keep("groups", _groups())
     driver.picture("onwards_stations")
+    yield from _compare_lifted(driver, layers["Rails"])
+
+
+def _compare_lifted(driver: Driver, rails: QgsVectorLayer) -> Iterator:
+    """Compare rails with a copy of them that lies 10 mm higher."""
+    lift = {"INPUT": rails, "DELTA_Z": 0.01, "OUTPUT": "memory:"}
+    lifted = QgsProject.instance().addMapLayer(processing.run("native:translategeometry", lift)["OUTPUT"])
+    dialog = yield from open_dialog("comparetracks")
+    dialog.setParameters({"REFERENCE": rails.id(), "INPUT": lifted.id()})
+    driver.keep("comparison", (yield from press_run(dialog)))
+    yield from close(dialog)
+    (differences,) = (one for one in QgsProject.instance().mapLayers().values() if one.name().startswith("Differences"))
+    iface.mapCanvas().setExtent(differences.extent())
+    yield 1.0
+    driver.picture("onwards_compared")
+    renderer = differences.renderer()
+    expression, context = QgsExpression(renderer.classAttribute()), differences.createExpressionContext()
+    drawn = set()
+    for row in differences.getFeatures():
+        context.setFeature(row)
+        drawn.add(expression.evaluate(context))
+    driver.keep("drawn", [one.label() for one in renderer.categories() if one.value() in drawn])
 
 
 def tried(driver: Driver) -> Iterator:

@@ -16,11 +16,11 @@ import numpy as np
 from osgeo import gdal, ogr, osr
 from qgis.core import QgsFeature, QgsProcessingContext, QgsWkbTypes
 from rail_extract.core.alignment.elements import Alignment, CantElement, VerticalElement, chained
-from rail_extract.core.alignment.landxml_reading import read_landxml
-from rail_extract.core.alignment.table import rows
 from rail_extract.core.design_numbers import MAX_KM, MAX_PLACE_M
+from rail_extract.core.files.design_files import write_designs
+from rail_extract.core.files.landxml_reading import read_landxml
+from rail_extract.core.files.table import rows
 from rail_extract.core.frame import LocalFrame
-from rail_extract.core.output.design_files import write_designs
 from rail_extract.core.standards import STANDARDS
 
 from .clouds import write_las

@@ -113,11 +113,11 @@ def write_lines(folder: Path, suffix: str) -> list[Path]:
 def write_raster(folder: Path) -> list[Path]:
     """Write a small rail raster."""
     from rail_extract.core.clouds.crs import import_pyproj
+    from rail_extract.core.files.raster_file import header_for
     from rail_extract.core.frame import LocalFrame
-    from rail_extract.core.output.raster_file import header_for
     from rail_extract.core.raster import rasterize
     from rail_extract.core.standards import STANDARDS
-    from rail_extract.rail_extract_plugin.reading.geotiff import write_rasters
+    from rail_extract.rail_extract_plugin.writing.geotiff import write_rasters
 
     qgis()
     raster = rasterize(np.random.default_rng(0).uniform(0, 4, (200, 2)), 0.04)

@@ -131,7 +131,7 @@ def test_places_have_their_kilometre_along_an_axis(tmp_path, decreasing):
 
 def test_an_axis_may_state_kilometres_as_m_values(tmp_path):
     place = tmp_path / "km.gpkg"
-    measured_line = pytest.importorskip("rail_extract.core.output.writing").measured_line
+    measured_line = pytest.importorskip("rail_extract.core.files.writing").measured_line
     line = measured_line(np.array([[*CORNER, 3.0], [*CORNER + [1000, 0, 0], 4.0]]))
     pyogrio.raw.write(str(place), layer="axis", driver="GPKG", geometry_type="Unknown", crs="EPSG:25832",
                       geometry=np.array([line], object),

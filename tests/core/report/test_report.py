@@ -242,6 +242,23 @@ def test_the_page_needs_no_other_file_and_is_valid():
     assert html.count("<section>") == html.count("</section>") == 7
 
 
+PAPER_PX = 703
+"""Width of A4 upright between its margins."""
+
+HIDDEN = """
+var most = 0, boxes = document.querySelectorAll(".scroll");
+for (var i = 0; i < boxes.length; i++) { most = Math.max(most, boxes[i].scrollWidth - boxes[i].clientWidth); }
+most;
+"""
+
+
+def test_pages_are_as_wide_as_the_window_and_paper_shows_every_column(in_browser):
+    html = page(track(sigma_mm=np.full(101, 9.0)), source="cloud.laz")
+    (width,) = in_browser(html, ["document.querySelector('section').offsetWidth"], 1900)
+    assert width > 1800
+    assert in_browser(html.replace("@media print", "@media screen"), [HIDDEN], PAPER_PX) == [0]
+
+
 def test_all_text_is_escaped():
     nasty = '<script>alert("1")</script>&'
     html = page(track(), source=nasty, facts={nasty: nasty})
