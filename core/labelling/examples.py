@@ -15,8 +15,8 @@ from ..learned.examples import Examples, save_index, write_square
 from ..progress import SILENT, Progress
 from ..run.loop import Runner
 from ..scratch import scratch_folder
-from ..squares.grid import Square
-from ..squares.store import files_of, read_stored
+from ..tiles.grid import Square
+from ..tiles.store import files_of, read_stored
 from .finding import POINT, sort_files
 
 

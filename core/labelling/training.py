@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import shutil
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,7 +13,7 @@ from ..clouds.points import Request
 from ..disk import Destination, writing
 from ..errors import ParameterError
 from ..kernels import device_of
-from ..learned.examples import CHECKS, Examples
+from ..learned.examples import CHECKS, Examples, Plan
 from ..learned.model import WEIGHTS_SUFFIX, check_torch, load, save
 from ..progress import SILENT, Progress
 from .examples import write_examples
@@ -29,29 +28,6 @@ SOURCE, EXAMPLES = "source.json", "examples"
 
 READING = 0.1
 """Share of a training that reading takes, for the progress."""
-
-
-@dataclass(frozen=True)
-class Plan:
-    """What a training is given, besides the cloud.
-
-    Attributes
-    ----------
-    rail_classes : tuple of int
-        Classes of the rail points.
-    epochs : int
-        How many times each block with rails is learned from.
-    seed : int
-    device : {"AUTO", "CPU", "CUDA"}
-    start : Path, optional
-        Weights to start from.
-    """
-
-    rail_classes: tuple[int, ...]
-    epochs: int
-    seed: int
-    device: str
-    start: Path | None = None
 
 
 def check_training(weights: Path, plan: Plan) -> None:

@@ -12,8 +12,8 @@ ROOT = Path(__file__).resolve().parents[2]
 PIP = [sys.executable, "-m", "pip", "--disable-pip-version-check", "-q"]
 
 EXAMPLES = """
-import doctest, rail_extract, rail_extract.core.front, rail_extract.core.clouds.points
-for module in (rail_extract, rail_extract.core.front, rail_extract.core.clouds.points):
+import doctest, rail_extract, rail_extract.core.commands.front, rail_extract.core.clouds.points
+for module in (rail_extract, rail_extract.core.commands.front, rail_extract.core.clouds.points):
     assert module.__file__.startswith({folder!r}), module.__file__
     failed, attempted = doctest.testmod(module, optionflags=doctest.NORMALIZE_WHITESPACE)
     assert attempted and not failed, module
