@@ -48,7 +48,7 @@ def test_wheel_holds_the_core_its_weights_and_the_sample_only(wheel):
     names = zipfile.ZipFile(wheel).namelist()
     folders = {"/".join(name.split("/")[:2]) for name in names if name.count("/") > 1}
     assert folders == {"rail_extract/core", "rail_extract/models", "rail_extract/resources"}
-    expected = ["py.typed", "core/front.py", "models/frpdf_fast.npz", "resources/sample/sample.laz"]
+    expected = ["py.typed", "core/commands/front.py", "models/frpdf_fast.npz", "resources/sample/sample.laz"]
     assert {f"rail_extract/{name}" for name in expected} <= set(names)
 
 
