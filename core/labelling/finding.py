@@ -25,9 +25,9 @@ from ..progress import SILENT, Progress, counted
 from ..rails import ENOUGH_CELLS_PER_M, SearchFigures
 from ..run.loop import Runner
 from ..run.tasks import Context, Task
-from ..squares.grid import Key, Square, Tiling
-from ..squares.store import SortedFile, append, counts_of, files_of, read_stored
 from ..standards import LAST_CLASS
+from ..tiles.grid import Key, Square, Tiling
+from ..tiles.store import SortedFile, append, counts_of, files_of, read_stored
 
 POINT = np.dtype([("xyz", "<f8", 3), ("number", "<i8"), ("mark", "<u4")])
 """A point on disk: coordinates in units of the CRS, its number among all points of all files, and its mark, see

@@ -25,8 +25,8 @@ from ..progress import SILENT, Progress
 from ..rails import SearchFigures
 from ..raster import BORDER_CELLS, cell_size
 from ..run.loop import Runner
-from ..squares.grid import Key
-from ..squares.store import files_of, read_stored
+from ..tiles.grid import Key
+from ..tiles.store import files_of, read_stored
 from .files import Choice, Labels, Output, Result, write_labelled
 from .finding import POINT, box_of, sort_files
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 import json
 import shutil
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,13 +18,13 @@ from ..clouds.points import Request
 from ..disk import Destination, writing
 from ..errors import NoRailPointsError, ParameterError
 from ..kernels import device_of
-from ..learned.examples import CHECKS, Examples, save_index, write_square
+from ..learned.examples import CHECKS, Examples, Plan, save_index, write_square
 from ..learned.model import WEIGHTS_SUFFIX, check_torch, load, save
 from ..progress import SILENT, Progress
 from ..run.loop import Runner
 from ..scratch import scratch_folder
-from ..squares.grid import Square
-from ..squares.store import files_of, read_stored
+from ..tiles.grid import Square
+from ..tiles.store import files_of, read_stored
 from .finding import POINT, sort_files
 
 if TYPE_CHECKING:
@@ -38,28 +37,6 @@ SOURCE, EXAMPLES = "source.json", "examples"
 
 READING = 0.1
 """Share of a training that reading takes, for the progress."""
-
-
-@dataclass(frozen=True)
-class Plan:
-    """What a training is given, besides the cloud.
-
-    Attributes
-    ----------
-    rail_classes : tuple of int
-        Classes of the rail points.
-    epochs : int
-        How many times each block with rails is learned from.
-    device : {"AUTO", "CPU", "CUDA"}
-    start : Path, optional
-        Weights to start from.
-    """
-
-    rail_classes: tuple[int, ...]
-    epochs: int
-    seed: int
-    device: str
-    start: Path | None = None
 
 
 def check_training(weights: Path, plan: Plan) -> None:

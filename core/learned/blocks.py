@@ -16,7 +16,7 @@ from scipy.spatial import cKDTree
 
 from ..classify.bed import Bed, Coarse
 from ..classify.tops import HIGH_M, LOW_M, TOP_M
-from ..squares.grid import Tiling
+from ..tiles.grid import Tiling
 
 BLOCK_M = 4.0
 """Side of a block: it holds both rails of a track of any gauge."""

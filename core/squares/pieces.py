@@ -14,7 +14,7 @@ from ..frame import LocalFrame
 from ..lines.finishing import SAME_RAIL_M
 from ..polyline import Polyline, interpolate, project, runs
 from ..rails import RailLine
-from .grid import HALO_M, Square
+from ..tiles.grid import HALO_M, Square
 
 CUT_STEP_M = 0.25
 """Spacing of the stations at which lines are cut and compared."""

@@ -16,12 +16,12 @@ from pathlib import Path
 
 import numpy as np
 
+from ..clouds.on_heads import heads_of
 from ..clouds.passes import number_passes
 from ..clouds.points import RailPoints, Request, origin_steps
 from ..clouds.readers import CloudHeader
 from ..disk import writing
 from ..frame import LocalFrame
-from ..heads.on_heads import heads_of
 from ..progress import SILENT, Progress
 from ..scratch import discard, scratch_folder
 from .grid import Key, Square, Tiling, around

@@ -14,9 +14,9 @@ from typing import Protocol
 
 import numpy as np
 
+from ..clouds.on_heads import heads_of
 from ..clouds.points import RailPoints
 from ..frame import LocalFrame
-from ..heads.on_heads import heads_of
 from ..rails import SearchFigures
 from ..raster import TILE, RailRaster
 
