@@ -12,8 +12,8 @@ from ..errors import RailExtractError
 from ..polyline import Polyline
 from ..progress import Progress
 from .elements import Alignment
-from .equations import SAME_PLACE_M
 from .measured import Track
+from .stations import SAME_PLACE_M
 
 BESIDE_M = 2.0
 """Largest median distance of a track from its alignment, metres: that of its neighbour is at least 3.4 m away."""

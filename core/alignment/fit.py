@@ -17,15 +17,12 @@ from ..progress import SILENT, Progress
 from .chain import Chain
 from .deviations import Deviations, deviations_of
 from .elements import Alignment, Element, PlanElement
-from .given import Given, given_along, given_of, noted, without
-from .intrinsic import lateral_signal
-from .layouts import cants, heights, on_clothoids
-from .measured import LEAST_POINTS, Measured, Track, measured_of
+from .held import Given, given_along, given_of, noted, off_element, with_round_radii, without
+from .layouts import cants, chain_errors, heights, on_clothoids, plan_errors, remaining
+from .measured import LEAST_POINTS, Measured, Track, lateral_signal, measured_of
 from .noise import Noise, strays
 from .plane_fit import FitError, PlanFit, Points, fit_plan
-from .rounding import off_element, with_round_radii
 from .signals import CANT, HEIGHT, PLAN, Kind, Signal, find_structure, noise_of, refitted
-from .uncertainty import chain_errors, plan_errors, remaining
 
 HOLDS = 3.0
 """A fit does not hold where the line is off by more than this many tolerances, as a root mean square."""

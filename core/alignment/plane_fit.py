@@ -16,8 +16,7 @@ from scipy.sparse.linalg import splu
 
 from ..progress import SILENT, Progress
 from .chain import NOTHING, Chain, Held
-from .curves import PANEL_RAD, UNIT_NODES, UNIT_WEIGHTS, displaced, turned
-from .elements import PlanElement
+from .elements import PANEL_RAD, UNIT_NODES, UNIT_WEIGHTS, PlanElement, displaced, turned
 
 ROUNDS, CLOSED_M, OPEN_M = 40, 1e-6, 1e-5
 """Largest number of steps, the gap between elements and the change at which they end, and the gap beyond which the fit

@@ -17,13 +17,14 @@ from ..clouds.crs import MAX_COORDINATE, is_geographic, parse_crs
 from ..clouds.readers import CATALOGUE, paths_of
 from ..disk import Destination, writing
 from ..errors import CrsError, ParameterError, RailExtractError
+from ..files.rail_rasters import RasterSource, open_with_rasterio
+from ..files.raster_file import write_rasters
 from ..jobs import declaration as kinds
 from ..jobs.clouds import Bounds, CloudSource, checked_crs
 from ..jobs.declaration import Job, Parameter
 from ..jobs.result import Result
 from ..jobs.shared import WEB_PAGES
 from ..jobs.values import Rows, Values
-from ..output.raster_file import write_rasters
 from ..progress import Progress
 from ..run.loop import Runner
 from ..run.processes import workers
@@ -32,9 +33,10 @@ from .options import vector_module
 
 if TYPE_CHECKING:
     from ..airborne.survey import Guide
-    from ..alignment.placed_axes import PlacedAxes
     from ..jobs.lines import Lines
+    from ..jobs.places import Places
     from ..jobs.result import Rasters
+    from ..kilometres.axes import PlacedAxes
     from .vectors import Features
 
 Spell = Callable[[Parameter], str]
@@ -124,7 +126,11 @@ class FileValues(Values):
 
     def axes(self, crs_wkt: str | None) -> PlacedAxes:
         """Read AXIS and what states its kilometres, in a coordinate system."""
-        return vector_module("AXIS", "kilometres").read_axes(self, None, crs_wkt)[0]
+        return vector_module("AXIS", "kilometres").read_axes(self, crs_wkt)
+
+    def places(self, name: str, plane: str | None, progress: Progress) -> Places:
+        """Read the features of a layer of any kind, in the plane of the axes."""
+        return vector_module(name, "kilometres").places_of(self.features(name), plane)
 
     @property
     def keeps(self) -> bool:
@@ -133,10 +139,17 @@ class FileValues(Values):
 
     def cloud(self, name: str = "INPUT") -> CloudSource:
         """Return the files of a cloud, and which of their points count."""
-        source = CloudSource(tuple(paths_of(self[name])), self["CRS"], leave_out=self._values.get("LEAVE_OUT") or ())
+        source = CloudSource(
+            tuple(paths_of(self[name])), self._values.get("CRS"), leave_out=self._values.get("LEAVE_OUT") or ()
+        )
         if not (self.has("MASK") and self.filled("MASK")):
             return source
         return replace(source, mask=vector_module("MASK").read_mask(self["MASK"], checked_crs(source)))
+
+    def raster(self, name: str) -> RasterSource:
+        """Return a file of rail rasters."""
+        check_rasterio(name)
+        return RasterSource(Path(self[name]), open_with_rasterio)
 
     def extent(self, crs_wkt: str | None) -> Bounds | None:
         """Return EXTENT, which is in the coordinate system of the cloud."""
@@ -214,7 +227,7 @@ def _failures(result: Result, values: FileValues) -> Iterator[RailExtractError]:
     layers = {name: make() for name, make in result.layers.items() if values.wanted(name)}
     for file in dict.fromkeys(values.destination(name).file for name in layers):
         names = [name for name in layers if values.destination(name).file == file]
-        writing_module = vector_module(names[0], ".output.writing")
+        writing_module = vector_module(names[0], ".files.writing")
         together = [layers[name] for name in names], values.destination(names[0]), result.frame
         writers.append(partial(writing_module.write_layers, *together))
     pages = {name: make for name, make in result.pages.items() if values.wanted(name)}
@@ -349,9 +362,15 @@ def check_packages(one: kinds.Output) -> None:
         A package is not installed.
     """
     if isinstance(one, kinds.LayerOutput):
-        vector_module(one.name, ".output.writing")
-    elif isinstance(one, kinds.RasterOutput) and find_spec("rasterio") is None:
-        raise ParameterError(f"{one.name} needs the package rasterio: in a clone, run pip install .[cluster].")
+        vector_module(one.name, ".files.writing")
+    elif isinstance(one, kinds.RasterOutput):
+        check_rasterio(one.name)
+
+
+def check_rasterio(name: str) -> None:
+    """Check before a run that an input or output can be read or written."""
+    if find_spec("rasterio") is None:
+        raise ParameterError(f"{name} needs the package rasterio: in a clone, run pip install .[cluster].")
 
 
 def destinations_of(job: Job, files: Mapping[str, Path]) -> dict[str, Destination]:

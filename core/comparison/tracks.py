@@ -156,6 +156,12 @@ class LineDifferences:
         return cls(xyz=places, left=left, chainage_m=t, moved=moved, **{**unknown, **known})
 
     @property
+    def shifted(self) -> np.ndarray:
+        """Whether the constant shift alone exceeds `SURE` standard errors, (n,) bool."""
+        across, up = np.abs(self.shift_mm) > SURE * self.sigma_mm, np.abs(self.shiftz_mm) > SURE * self.sigmaz_mm
+        return across | up
+
+    @property
     def cells_m(self) -> np.ndarray:
         """Length that each station represents, (n,)."""
         return np.diff(cell_borders(self.chainage_m))
@@ -181,11 +187,14 @@ class TrackComparison:
         One for each line of the reference, then one for each line of the other survey with extra lengths.
     estimated_m : float
         Standard error across that the scatter of the differences shows, where lines state none; NaN otherwise.
+    counts_shift : bool
+        Whether the constant shift counts as a movement.
     """
 
     lines: tuple[LineDifferences, ...]
     shift: Shift
     estimated_m: float
+    counts_shift: bool
 
     def length_of(self, state: str) -> float:
         """Return the length in a state, metres."""
@@ -245,7 +254,8 @@ def compare_surveys(
         _extra(line, number, chords, settings, progress)
         for number, line in enumerate(progress.span(0.8, 1).follow(other.lines))
     ]
-    return TrackComparison((*lines, *filter(None, extra)), shift, scatter_m[0] if estimated else np.nan)
+    estimate_m = scatter_m[0] if estimated else np.nan
+    return TrackComparison((*lines, *filter(None, extra)), shift, estimate_m, not settings.ignore_shift)
 
 
 def _stations(line: np.ndarray, step_m: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -32,7 +32,7 @@ CIRCLES, PARABOLAS = VERTICAL_CURVES = ("CIRCLES", "PARABOLAS")
 
 def _check(values: Values) -> None:
     """Check the rail and the name of the file."""
-    from ..output.design_files import check_format
+    from ..files.design_files import check_format
 
     values.standard()
     values.prepare(values.system("INPUT") or values["CRS"])
@@ -41,7 +41,7 @@ def _check(values: Values) -> None:
 
 def _run(values: Values, progress: Progress) -> Result:
     """Read the table, check it and write the file."""
-    from ..output.design_files import check_designs, left_out, write_designs
+    from ..files.design_files import check_designs, left_out, write_designs
     from .reading import read_elements
     from .result import Result
 

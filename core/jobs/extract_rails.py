@@ -115,8 +115,8 @@ def _run(values: Values, progress: Progress) -> Result:
 
 def _result(values: Values, network: RailNetwork, origin: Origin) -> Result:
     """Return what was extracted as a result."""
-    from ..output.layers import network_makers
-    from ..report import summary
+    from ..checks.listing import summary
+    from ..files.layers import network_makers
     from .result import Result, ShownCloud
 
     figures: dict[str, Any] = {
@@ -139,7 +139,7 @@ def _result(values: Values, network: RailNetwork, origin: Origin) -> Result:
 
 def _cleaned(values: Values, network: RailNetwork, standard: RailStandard) -> Rasters | None:
     """Return the network's output as Clean Rail Raster writes it; None if no rail cell is left."""
-    from ..output.raster_file import header_for, on_one_grid
+    from ..files.raster_file import header_for, on_one_grid
 
     if not any(raster.tiles for raster in network.cleaned):
         return None

@@ -113,10 +113,10 @@ def _check(values: Values) -> None:
 
 def _run(values: Values, progress: Progress) -> Result:
     """Follow the rails and write the copy."""
+    from ..files.layers import stops_layer
     from ..grow.settings import GrowSettings
     from ..labelling.files import Choice, plan_output
     from ..labelling.growing import grow_files
-    from ..output.layers import stops_layer
     from ..run.loop import Runner
 
     progress, standard = Estimating(progress), values.standard()

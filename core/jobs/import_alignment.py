@@ -43,8 +43,8 @@ def _check(values: Values) -> None:
 
 def _system(values: Values) -> str | None:
     """Return the coordinate system of the file as WKT: what it states, else CRS, else that of the tracks."""
-    from ..alignment.landxml_reading import stated_system
     from ..clouds.crs import codes_and_names, parse_crs, units
+    from ..files.landxml_reading import stated_system
 
     stated = stated_system(values["INPUT"]) or values["CRS"]
     if not stated and values.filled("TRACKS"):
@@ -61,10 +61,10 @@ def _system(values: Values) -> str | None:
 
 def _run(values: Values, progress: Progress) -> Result:
     """Read the file, and compare the tracks with it."""
-    from ..alignment.landxml_reading import read_landxml
     from ..fields import DEVIATIONS
-    from ..output.design_files import check_place
-    from ..output.layers import axes_layer, elements_layer, stations_layer
+    from ..files.design_files import check_place
+    from ..files.landxml_reading import read_landxml
+    from ..files.layers import axes_layer, elements_layer, stations_layer
     from ..progress import Recording
     from ..report import build_alignment_page
     from .result import Result

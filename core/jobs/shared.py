@@ -7,11 +7,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from ..alignment.km_text import HECTOMETRES, NOTATIONS
 from ..design_numbers import KM
 from ..fields import BRIDGED, LENGTH, SIGMA
 from ..frpdf import DEVICES, ENGINES, MAX_PASSES
 from ..frpdf.models import NAMES
+from ..kilometres.text import HECTOMETRES, NOTATIONS
 from ..parameters import (
     DEFAULT_STEP_M,
     DEFAULT_WORKERS,

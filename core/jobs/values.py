@@ -30,11 +30,13 @@ if TYPE_CHECKING:
     import numpy as np
 
     from ..airborne.survey import Guide
-    from ..alignment.placed_axes import PlacedAxes
     from ..clouds.points import Request
+    from ..files.rail_rasters import RasterSource
+    from ..kilometres.axes import PlacedAxes
     from ..progress import Progress
     from ..run.loop import Runner
     from .lines import Lines
+    from .places import Places
 
 NUMBERS = {
     "SMOOTHING_XY": "smoothing_xy_m",
@@ -132,8 +134,16 @@ class Values(ABC):
         """Read AXIS and what states its kilometres, in a coordinate system."""
 
     @abstractmethod
+    def places(self, name: str, plane: str | None, progress: Progress) -> Places:
+        """Read the features of a layer of any kind, in the plane of the axes."""
+
+    @abstractmethod
     def cloud(self, name: str = "INPUT") -> CloudSource:
         """Return the files of a cloud, and which of their points count."""
+
+    @abstractmethod
+    def raster(self, name: str) -> RasterSource:
+        """Return a file of rail rasters."""
 
     @abstractmethod
     def extent(self, crs_wkt: str | None) -> Bounds | None:

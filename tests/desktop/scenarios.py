@@ -9,10 +9,12 @@ from collections.abc import Iterable, Iterator
 from functools import partial
 from pathlib import Path
 
+import processing
 from driver import Driver, algorithm, choose, close, install, later, open_batch, open_dialog, press_run, window
 from qgis.core import (
     QgsApplication,
     QgsCoordinateReferenceSystem,
+    QgsExpression,
     QgsLayerTree,
     QgsPointCloudLayer,
     QgsPointXY,
@@ -47,7 +49,7 @@ from qgis.PyQt.QtWidgets import (
 )
 from qgis.utils import iface, loadPlugin, plugins, reloadPlugin, startPlugin, unloadPlugin
 
-RAW, SAMPLE, ARCHIVE = (os.environ[f"RAIL_EXTRACT_{name}"] for name in ("RAW", "SAMPLE", "ZIP"))
+RAW, BLUNT, SAMPLE, ARCHIVE = (os.environ[f"RAIL_EXTRACT_{name}"] for name in ("RAW", "BLUNT", "SAMPLE", "ZIP"))
 NAMES = (
     *("extractrails", "classifyrailpoints", "growrailpoints", "airbornecenterlines"),
     *("rasterizerailpoints", "frpdfcleanup", "vectorizerails"),
@@ -328,6 +330,9 @@ def raw(driver: Driver) -> Iterator:
     driver.keep("systems", {layer.name(): layer.crs().toWkt() for layer in layers})
     driver.keep("bars", [item.text() for item in iface.messageBar().items()])
     yield from _save_all(driver, log)
+    dialog.setParameters({"INPUT": BLUNT, "CLASSIFY": True, "STANDARD": "DETECT"})
+    driver.keep("blunt", (yield from press_run(dialog)).rpartition("starting")[2])
+    driver.picture("raw_blunt")
     yield from close(dialog)
 
 
@@ -463,6 +468,28 @@ def onwards(driver: Driver) -> Iterator:
     driver.keep("colours", [one.symbol().color().name() for one in stationed.renderer().categories()])
     driver.keep("groups", _groups())
     driver.picture("onwards_stations")
+    yield from _compare_lifted(driver, layers["Rails"])
+
+
+def _compare_lifted(driver: Driver, rails: QgsVectorLayer) -> Iterator:
+    """Compare rails with a copy of them that lies 10 mm higher."""
+    lift = {"INPUT": rails, "DELTA_Z": 0.01, "OUTPUT": "memory:"}
+    lifted = QgsProject.instance().addMapLayer(processing.run("native:translategeometry", lift)["OUTPUT"])
+    dialog = yield from open_dialog("comparetracks")
+    dialog.setParameters({"REFERENCE": rails.id(), "INPUT": lifted.id()})
+    driver.keep("comparison", (yield from press_run(dialog)))
+    yield from close(dialog)
+    (differences,) = (one for one in QgsProject.instance().mapLayers().values() if one.name().startswith("Differences"))
+    iface.mapCanvas().setExtent(differences.extent())
+    yield 1.0
+    driver.picture("onwards_compared")
+    renderer = differences.renderer()
+    expression, context = QgsExpression(renderer.classAttribute()), differences.createExpressionContext()
+    drawn = set()
+    for row in differences.getFeatures():
+        context.setFeature(row)
+        drawn.add(expression.evaluate(context))
+    driver.keep("drawn", [one.label() for one in renderer.categories() if one.value() in drawn])
 
 
 def tried(driver: Driver) -> Iterator:

@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 from rail_extract.core.alignment.elements import Alignment, CantElement, VerticalElement, chained
 from rail_extract.core.alignment.fit import fit_track, fit_tracks
-from rail_extract.core.alignment.given import noted
+from rail_extract.core.alignment.held import noted, round_radius
 from rail_extract.core.alignment.measured import Track
-from rail_extract.core.alignment.rounding import round_radius
-from rail_extract.core.alignment.table import alignments, rows
 from rail_extract.core.errors import ParameterError
 from rail_extract.core.fields import ELEMENT_FIELDS
+from rail_extract.core.files.table import alignments, rows
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.parameters import FitParameters
 from rail_extract.core.progress import Progress, Recording

@@ -9,8 +9,8 @@ from memory_layers import layer_of
 from osgeo import ogr
 from qgis.core import NULL, QgsFeature, QgsProcessingUtils, QgsVectorLayer, QgsWkbTypes
 from rail_extract.core.alignment.elements import Alignment, CantElement, VerticalElement, chained
-from rail_extract.core.alignment.table import rows
 from rail_extract.core.fields import ELEMENT_FIELDS
+from rail_extract.core.files.table import rows
 from rail_extract.core.frame import LocalFrame
 from rail_extract.rail_extract_plugin.writing.layers import fields
 

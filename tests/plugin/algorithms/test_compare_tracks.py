@@ -7,7 +7,8 @@ from qgis.core import NULL
 
 CORNER = np.array([500_000.0, 3_000_000.0, 100.0])
 NAMES = (
-    "line_id input_id chainage_m state across_mm height_mm gauge_mm cant_mm sigma_mm sigmaz_mm shift_mm shiftz_mm moved"
+    "line_id input_id chainage_m state across_mm height_mm gauge_mm cant_mm sigma_mm sigmaz_mm shift_mm shiftz_mm "
+    "moved shifted"
 )
 SPACING_M = 1.507
 
@@ -83,7 +84,9 @@ def test_a_constant_shift_is_stated_apart(compare):
     assert results["MOVED_LENGTH"] == 0
     np.testing.assert_allclose(values["height_mm"].astype(float), 10.0)
     np.testing.assert_allclose(values["across_mm"].astype(float), values["shift_mm"].astype(float), atol=0.3)
-    assert any("+30.0 mm east, -20.0 mm north, +10.0 mm up" in line for line in feedback.infos)
+    shown = "shifted by +30.0 mm east, -20.0 mm north, +10.0 mm up; apart from that, nothing has moved"
+    assert any(shown in line for line in feedback.infos)
+    assert set(values["shifted"]) == {1}
     results, _, _ = compare(earlier, later, IGNORE_SHIFT=False)
     assert results["MOVED_LENGTH"] == pytest.approx(500, abs=3)
 

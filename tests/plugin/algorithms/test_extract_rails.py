@@ -20,10 +20,11 @@ from qgis.core import (
     QgsRectangle,
     QgsVectorLayer,
 )
+from rail_extract.core.files.rail_rasters import RasterSource
 from rail_extract.core.kernels import blas
 from rail_extract.core.run import processes
 from rail_extract.core.scratch import PREFIX
-from rail_extract.rail_extract_plugin.reading.geotiff import read_header
+from rail_extract.rail_extract_plugin.reading.rasters import open_with_gdal
 
 POINTS = f"{PREFIX}*/*/10_*"
 """Files with temporary points of class 10."""
@@ -174,7 +175,7 @@ def test_cleaned_raster_equals_that_of_the_steps(run, run_step, scene, tmp_path)
     assert run_step("rasterizerailpoints", {"INPUT": scene["INPUT"], "OUTPUT": raster}).ok
     assert run_step("frpdfcleanup", {"INPUT": raster, "ITERATIONS": 1, "OUTPUT": cleaned}).ok
     for path in (whole, cleaned):
-        assert read_header(path).class_codes == (10,)
+        assert RasterSource(path, open_with_gdal).header.class_codes == (10,)
         assert gdal.Open(str(path)).GetMetadataItem("RAIL_HEAD_MM") == "72"
     cells = [set(map(tuple, places_of(path).round(3))) for path in (whole, cleaned)]
     assert len(cells[0]) > 500
@@ -203,7 +204,10 @@ def test_findings_are_the_table_of_the_report(run, write_cloud, track, tmp_path)
     assert layer.crs().authid() == "EPSG:32643"
     assert layer.wkbType() == 1002  # LineStringZ
     assert [finding["finding"] for finding in findings] == [1, 2]
-    assert [finding["reason"] for finding in findings] == ["gauge off by more than 10 mm", "a rail has no points"]
+    assert [finding["reason"] for finding in findings] == [
+        "gauge off by more than 10 mm and 4 standard errors",
+        "a rail has no points",
+    ]
     wide, bare = findings
     assert (wide["from_m"], wide["to_m"]) == pytest.approx((20, 30), abs=2)
     assert wide["gauge_mm"] == pytest.approx(1455, abs=3)  # where it is widest

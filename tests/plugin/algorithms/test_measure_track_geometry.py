@@ -186,7 +186,9 @@ def test_report_and_findings_judge_lines_from_files(measure, tmp_path):
     for more, count in (({"GAUGE": 1420}, 1), ({"GAUGE": 1000}, 1), ({"GAUGE": 1000, "OTHER_GAUGES": "1435"}, 0)):
         measure(lines, rails, **paths, **more)
         findings = list(QgsVectorLayer(paths["FINDINGS"]).getFeatures())
-        assert [finding["reason"] for finding in findings] == count * ["gauge off by more than 10 mm"], more
+        assert [finding["reason"] for finding in findings] == count * [
+            "gauge off by more than 10 mm and 4 standard errors"
+        ], more
     measure(lines, rails, **paths, STANDARD="CUSTOM", HEAD_WIDTH=72)
     assert "72 mm head, 1435 mm as measured" in report.read_text(encoding="utf-8")
 

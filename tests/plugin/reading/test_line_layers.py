@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 from memory_layers import layer_of
+from qgis.core import QgsGeometry, QgsLineString
 from rail_extract.core.progress import SILENT
 from rail_extract.rail_extract_plugin.reading.line_layers import read_lines
 
@@ -144,3 +145,8 @@ def test_three_rails_make_two_tracks_in_one_run(layer, run_step, context):
     tracks = context.getMapLayer(outcome.results["OUTPUT"]).getFeatures()
     found = [(track["left_ids"], track["right_ids"], round(track["gauge_mm"])) for track in tracks]
     assert found == [("3", "1", 1435), ("2", "1", 1000)]
+
+
+def test_empty_lines_are_left_out(layer):
+    rails, _ = rails_of(layer(LEFT, QgsGeometry(QgsLineString()), RIGHT))
+    assert [len(rail.xyz) for rail in rails] == [2, 2]
