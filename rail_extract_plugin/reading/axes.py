@@ -60,7 +60,7 @@ def read_axes(
     crs : QgsCoordinateReferenceSystem
         Projected, or invalid for coordinates in metres that nothing transforms.
     notation : str
-        One of `km_text.NOTATIONS`.
+        One of `text.NOTATIONS`.
     context : QgsProcessingContext
 
     Raises
