@@ -262,12 +262,10 @@ def warn_of_scale(
 
     Parameters
     ----------
-    crs : pyproj.CRS
     places : sequence of (x, y)
         In units of the CRS. One place with an acceptable scale factor is enough: the others may belong to stray points.
     what, it : str
         Subject and verb of the sentence, such as "cloud.laz is", and the pronoun that refers to the subject.
-    progress : Progress
     """
     plane = _plane(crs)
     known = [one for one in _scales(plane, places) if np.isfinite(one).all()] if plane.is_projected else []

@@ -46,7 +46,6 @@ class FileValues(Values):
 
     Parameters
     ----------
-    job : Job
     given : mapping of str to object
         Values and files by the name of the parameter or output; None, or none, where one is left empty.
     command : str
@@ -150,10 +149,8 @@ def run_with_files(job: Job, make: Callable[[], FileValues], progress: Progress,
 
     Parameters
     ----------
-    job : Job
     make : callable
         Returns the values.
-    progress : Progress
     spell : callable
         Returns how messages name a parameter.
 

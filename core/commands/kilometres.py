@@ -90,11 +90,8 @@ def located(
 
     Parameters
     ----------
-    features : Features
-    axes : PlacedAxes
     crs_wkt : str or None
         Of the plane of the axes.
-    progress : Progress
     """
     shapes = features.in_plane(crs_wkt)
     bounds = shapely.bounds(shapes)
@@ -170,9 +167,6 @@ def write_copy(
 
     Parameters
     ----------
-    destination : Destination
-    source : Features
-    fields : sequence of Field
     columns : sequence of sequence
         Values of each further field, one per feature.
     """

@@ -38,7 +38,6 @@ class Delivery:
         Name of the system of heights; empty if it is unknown.
     version : str
         Of this program.
-    made : datetime
     """
 
     gauge_m: float
@@ -106,7 +105,6 @@ def within_plan(alignment: Alignment, where: str, progress: Progress, start_m: f
 
     Parameters
     ----------
-    alignment : Alignment
     where : str
         Names it in messages.
     progress : Progress

@@ -74,7 +74,6 @@ def write_designs(
 
     Parameters
     ----------
-    alignments : sequence of Alignment
     standard : RailStandard
         Gauge and railhead width give the distance across which cant is measured.
     circles : bool

@@ -88,8 +88,6 @@ def write_shapes(
     ----------
     path : Path
         Ends in .dxf or .csv.
-    shapes : iterable of Shape
-    fields : sequence of Field
     frame : LocalFrame
         Of the coordinates.
     kind : str

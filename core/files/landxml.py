@@ -54,12 +54,8 @@ def write_landxml(
 
     Parameters
     ----------
-    path : Path
-    alignments : sequence of Alignment
-    delivery : Delivery
     circles : bool
         Whether curves of the profile are written as circles, as railways do, or as parabolas, as roads do.
-    progress : Progress
 
     Raises
     ------

@@ -52,7 +52,6 @@ class Part:
         Names it in messages.
     start, end : (2,) array
         Coordinates in the order of the file.
-    length_m : float
     k_from, k_to : float
         Curvatures in 1/m, positive to the left.
     seen : float
@@ -82,7 +81,6 @@ def parts_of(node: ET.Element, name: str, progress: Progress) -> list[Part]:
         The alignment.
     name : str
         Its name in messages.
-    progress : Progress
 
     Raises
     ------
@@ -111,8 +109,6 @@ def placed(parts: Sequence[Part], frame: LocalFrame, east_first: bool, progress:
 
     Parameters
     ----------
-    parts : sequence of Part
-    frame : LocalFrame
     east_first : bool
         Whether points are written easting first.
     progress : Progress

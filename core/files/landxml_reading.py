@@ -46,7 +46,6 @@ def read_landxml(path: Path, east_first: bool = False, progress: Progress = SILE
 
     Parameters
     ----------
-    path : Path
     east_first : bool
         Whether points are written easting first, against the format.
     progress : Progress
@@ -171,12 +170,10 @@ def branches(path: Path, root: str, names: Collection[str], progress: Progress =
 
     Parameters
     ----------
-    path : Path
     root : str
         Name of the root.
     names : collection of str
         Names, without a namespace.
-    progress : Progress
 
     Raises
     ------

@@ -81,7 +81,6 @@ class StepFile:
             Such as IFC4X3_ADD2, and the model view.
         name, program : str
             Of the file, and of the program that writes it.
-        made : datetime
         """
         stamp = written(made.replace(microsecond=0).isoformat())
         head = (

@@ -141,7 +141,6 @@ def alignments(table: Iterable[Row], frame: LocalFrame, progress: Progress = SIL
         type and radii are read in plan; height and gradients, or cant, in the other layouts.
     frame : LocalFrame
         Of the places in the alignments.
-    progress : Progress
 
     Raises
     ------

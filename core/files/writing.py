@@ -114,13 +114,7 @@ def _geometry(layer: Layer, frame: LocalFrame) -> np.ndarray:
 
 
 def measured_line(vertices: np.ndarray) -> bytes:
-    """Return a line with M values as well-known binary, which shapely does not write.
-
-    Parameters
-    ----------
-    vertices : (n, 3) or (n, 4) array
-        x, y, perhaps z, and M.
-    """
+    """Return a line of x, y, perhaps z, and M, (n, 3) or (n, 4), as well-known binary; shapely writes no M."""
     count, size = vertices.shape
     return struct.pack("<BII", 1, {3: LINE_M, 4: LINE_ZM}[size], count) + vertices.astype("<f8").tobytes()
 

@@ -47,7 +47,6 @@ class Feature:
 
     Attributes
     ----------
-    number : int
     row : mapping
         Values by the name of the field, None where one is empty.
     bounds : (k, 2) array
@@ -77,8 +76,6 @@ class Source(ABC):
     ----------
     name : str
         Of the parameter that was given it, for messages.
-    crs_wkt : str or None
-    fields : sequence of str
     count : int
         Number of features.
     """
@@ -193,7 +190,6 @@ def read_axes(values: Values, crs_wkt: str | None) -> PlacedAxes:
 
     Parameters
     ----------
-    values : Values
     crs_wkt : str or None
         Projected, or None for coordinates in metres that nothing transforms.
 
