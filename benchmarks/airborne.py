@@ -9,8 +9,8 @@ import argparse
 import time
 
 import numpy as np
-from rail_extract.core.airborne.axis import axis_of_guide
 from rail_extract.core.airborne.fitting import SEEN, fit_tracks
+from rail_extract.core.airborne.guide_line import axis_of_guide
 from rail_extract.laboratory.airborne.designs import SPACING_M, Design, canted_curve, curved_line, drawn_together, yard
 from rail_extract.laboratory.airborne.flight import Flight, fly
 from rail_extract.laboratory.ruler.airborne import Stationwise, compare_stations

@@ -10,15 +10,12 @@ from scipy.spatial import cKDTree
 
 from ..polyline import Polyline
 from ..progress import SILENT, Progress
-from .axis import Points
-from .beside import LONG, WIDE_M, Beside, look_beside
-from .corridor import gather
-from .course import Course, Evidence, evidence
-from .joint import certainty, courses, groups
-from .refinement import Refined, Traced, refine
+from .cross_sections import STATION_M
+from .guide_line import Points, gather
 from .ridges import HALF_M, Shape
-from .sections import STATION_M
-from .strips import strip_error
+from .rivals import LONG, WIDE_M, Beside, look_beside
+from .rounds import Refined, Traced, refine, strip_error
+from .search import Course, Evidence, certainty, courses, evidence, groups
 
 LONG_GAIN, LONG_SHARE = 7.0, 0.25
 """Gain that two rails must have over 70 m, and the share of the expected gain: roads, hedges and ditches stay below."""

@@ -11,8 +11,8 @@ from scipy.interpolate import CubicSpline
 from ..frame import LocalFrame
 from ..polyline import length_along
 from ..standards import GAUGE_RANGE_MM
+from .cross_sections import STATION_M
 from .fitting import BED_SIGMA_M, REASONS, SEEN, Stations
-from .sections import STATION_M
 
 MAX_UNSEEN_M, LEAST_STATIONS = 30.0, 3
 """A line ends where its track is not seen for longer, and is none with fewer stations that are."""

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -57,6 +58,12 @@ class Features(Source):
         """Number of features."""
         return len(self.ids)
 
+    @property
+    def kinds(self) -> Collection[str]:  # type: ignore[override]
+        """Kinds of the geometries; any, where there is no feature."""
+        found = {part.geom_type for part in shapely.get_parts(self.shapes)}
+        return {kind for name, kind in KINDS.items() if name in found or not self.count}
+
     def rows(self) -> Iterator[tuple[int, Row]]:
         """Yield number and values of each feature."""
         for number, feature in enumerate(self.ids):
@@ -71,20 +78,25 @@ class Features(Source):
                 own = shapely.get_coordinates(shape)
             is_lost = bool(np.isfinite(own).all()) and not all(np.isfinite(xyzm[:, :2]).all() for _, xyzm in parts)
             bounds = np.array([own.min(axis=0), own.max(axis=0)]) if len(own) else own
-            yield Feature(number, row, bounds, parts, is_lost)
+            yield Feature(number, row, bounds, parts, is_lost, partial(self._middle, shape, change))
+
+    def _middle(self, shape: shapely.Geometry, change: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+        """Return where a feature counts, (2,)."""
+        with explained(self.name):
+            moved = shapely.transform(shape, change)
+            if "Line" in moved.geom_type:
+                moved = shapely.line_interpolate_point(shapely.line_merge(moved), 0.5, normalized=True)
+            elif "Polygon" in moved.geom_type:
+                moved = shapely.point_on_surface(moved)
+            return np.array(shapely.get_coordinates(shapely.centroid(moved))[0])
 
     def rings(self, crs_wkt: str | None) -> list[np.ndarray]:
         """Return the rings of the polygons and of their holes; overlaps count once."""
         with explained(self.name):
-            areas = [part for part in shapely.get_parts(self.in_plane(crs_wkt)) if part.geom_type == "Polygon"]
+            moved = shapely.transform(self.shapes, self._change_to(crs_wkt))
+            areas = [part for part in shapely.get_parts(moved) if part.geom_type == "Polygon"]
             united = shapely.get_parts(shapely.union_all(shapely.make_valid([area for area in areas if area.area > 0])))
             return [shapely.get_coordinates(ring) for ring in shapely.get_rings(united)]
-
-    def in_plane(self, crs_wkt: str | None) -> np.ndarray:
-        """Return the geometries in another coordinate system."""
-        change = self._change_to(crs_wkt)
-        with explained(self.name):
-            return shapely.transform(self.shapes, change)
 
     def _change_to(self, crs_wkt: str | None) -> Callable[[np.ndarray], np.ndarray]:
         """Return what moves coordinates, (n, 2), to another system; nothing if it or the layer's is unknown."""

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 import numpy as np
+from scipy.spatial import cKDTree
 
 from ..polyline import Polyline
 from ..progress import SILENT, Progress
@@ -16,6 +15,23 @@ from .start import Start, find_start
 
 ON_HEAD = 0.5
 """Share of the width of a head within which a place is on the rail: the axis of another head is farther away."""
+
+
+APART = 1.8
+"""Distance of the seeds that are grown first, in longest runs: two runs from them meet, and share little but the bends
+of the rail and the distances between its seeds."""
+
+
+def apart_first(places: np.ndarray, apart_m: float) -> np.ndarray:
+    """Return an order of places, (n, 2), that begins with some that are more than `apart_m` apart, (n,) int.
+
+    All others are within `apart_m` of one of these.
+    """
+    tree, left, chosen = cKDTree(places), np.ones(len(places), dtype=bool), []
+    while left.any():
+        chosen.append(int(np.argmax(left)))
+        left[tree.query_ball_point(places[chosen[-1]], apart_m)] = False
+    return np.append(chosen, np.delete(np.arange(len(places)), chosen)).astype(int)
 
 
 class Growths:
@@ -40,9 +56,13 @@ class Growths:
         self._passed: list[np.ndarray] = []
         self.grown: list[Growth] = []
 
-    def add(self, places: Iterable[np.ndarray], progress: Progress = SILENT) -> bool:
-        """Grow from the places, (2,), of a seed; returns whether one of them is on a rail."""
-        return sum(self._add(place, progress) for place in places) > 0
+    def add(self, place: np.ndarray, progress: Progress = SILENT) -> bool:
+        """Grow from a place, (2,), unless it is on a rail that has grown; returns whether it is on a rail."""
+        progress.check()
+        key = tuple(place.tolist())
+        if key not in self._known:
+            self._known[key] = self._has_grown(place) or self._grows(place, progress)
+        return self._known[key]
 
     def reach_on(self, progress: Progress = SILENT) -> None:
         """Grow from a seed on a rail that has grown if it reaches beyond the end of the longest run."""
@@ -61,14 +81,6 @@ class Growths:
         return [
             stop for number, stop in self._ends() if stop.reason is not Reason.LENGTH or self._is_open(number, stop)
         ]
-
-    def _add(self, place: np.ndarray, progress: Progress) -> bool:
-        """Grow from a place unless it is on a rail that has grown; returns whether it is on a rail."""
-        progress.check()
-        key = tuple(place.tolist())
-        if key not in self._known:
-            self._known[key] = self._has_grown(place) or self._grows(place, progress)
-        return self._known[key]
 
     def _grows(self, place: np.ndarray, progress: Progress) -> bool:
         """Look for a rail at a place, and grow it unless it has grown; returns whether there is one."""

@@ -59,7 +59,7 @@ def _class_codes(values: Values) -> tuple[int, ...]:
 def _run(values: Values, progress: Progress) -> Result:
     """Fit the tracks along the guides."""
     from ..airborne.files import survey_files
-    from ..airborne.run import Run
+    from ..airborne.reading import Run
     from .result import ShownCloud
 
     progress, standard, codes = Estimating(progress), values.standard(), _class_codes(values)

@@ -6,7 +6,7 @@ QGIS reads layers itself, the command line and Python with pyogrio and shapely; 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -56,6 +56,8 @@ class Feature:
         of each polygon; NaN where there is no z or M. Curves are chords.
     is_lost : bool
         Whether it has no place in that coordinate system.
+    middle : callable
+        Returns where it counts, (2,): half way along a line, inside a polygon, in the mean of points.
     """
 
     number: int
@@ -63,6 +65,7 @@ class Feature:
     bounds: np.ndarray
     parts: Sequence[tuple[str, np.ndarray]]
     is_lost: bool
+    middle: Callable[[], np.ndarray]
 
     def of_kind(self, kind: str) -> Iterator[np.ndarray]:
         """Yield the vertices of the parts of a kind, (n, 4)."""
@@ -78,12 +81,18 @@ class Source(ABC):
         Of the parameter that was given it, for messages.
     count : int
         Number of features.
+    kinds : collection of str
+        Kinds of the geometries that it may have; none for a table.
+    notices : sequence of str
+        What the user is told of the fields where the features are copied.
     """
 
     name: str
     crs_wkt: str | None
     fields: Sequence[str]
     count: int
+    kinds: Collection[str]
+    notices: Sequence[str] = ()
 
     @abstractmethod
     def rows(self) -> Iterator[tuple[int, Row]]:

@@ -172,7 +172,7 @@ def without_steps(xyz: np.ndarray) -> np.ndarray:
     """Return vertices, (n, 3), without those that repeat the place before; heights are NaN unless all have one."""
     if not np.isfinite(xyz[:, 2]).all():
         xyz[:, 2] = np.nan
-    return xyz[np.append(True, np.any(np.diff(xyz[:, :2], axis=0) != 0, axis=1))]
+    return xyz[np.diff(xyz[:, :2], axis=0, prepend=np.nan).any(axis=1)]
 
 
 def _is_impossible(vertices: np.ndarray) -> bool:

@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from ..run.loop import Runner
     from .features import Source
     from .lines import Lines
+    from .places import Places
 
 NUMBERS = {
     "SMOOTHING_XY": "smoothing_xy_m",
@@ -171,6 +172,12 @@ class Values(ABC):
         from .features import read_axes
 
         return self.once("axes", lambda: read_axes(self, crs_wkt))
+
+    def places(self, name: str, plane: str | None, progress: Progress) -> Places:
+        """Read the features of a layer of any kind, in the plane of the axes; see `places_of`."""
+        from .places import places_of
+
+        return places_of(self.source(name), plane, progress)
 
     def lines_along(self, name: str, crs_wkt: str | None) -> Sequence[np.ndarray]:
         """Read lines that show places along tracks; see `read_lines_along`."""

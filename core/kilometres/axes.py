@@ -105,6 +105,7 @@ def make_axes(
     RailExtractError
         Nothing states kilometres, or what does contradicts itself or is on no railway.
     """
+    lines = [replace(line, name=" ".join(line.name.split())) for line in lines]  # for messages, which have one line
     _check(lines, start, posts)
     joined = [replace(line, name=line.name or str(number)) for number, line in enumerate(_joined(lines), start=1)]
     if (jumps or (start is not None and not posts)) and len(joined) > 1:

@@ -144,16 +144,25 @@ class _Knots:
         """Add the part before the first place, in which jumps are stated by their number ahead."""
         back: list[tuple[float, Jump]] = []
         place, number = s, km
-        for jump in reversed([one for one in self.jumps if _is_before(one, s, km)]):
-            place, number = place - 1000 * (number - jump.ahead_km), jump.back_km
-            if place < 0:
+        for jump in reversed(self._take_before(s, km)):
+            at = place - 1000 * (number - jump.ahead_km)
+            if not 0 <= at <= place:
                 raise _not_on_axis(jump)
-            back.insert(0, (place, jump))
-        del self.jumps[: len(back)]
+            place, number = at, jump.back_km
+            back.insert(0, (at, jump))
         self._add(0.0, number - place / 1000)
         for at, jump in back:
             self._jump(at, jump)
         self._add(s, km)
+
+    def _take_before(self, s: float, km: float) -> list[Jump]:
+        """Take the stated jumps up to the last one whose number ahead leads from a place on the axis to this one."""
+        leads = [
+            jump.ahead_km <= km and s - 1000 * (km - jump.ahead_km) >= SAME_PLACE_M for jump in reversed(self.jumps)
+        ]
+        count = len(leads) - leads.index(True) if any(leads) else 0
+        own, self.jumps = self.jumps[:count], self.jumps[count:]
+        return own
 
     def advance(self, s: float, km: float) -> None:
         """Add the part up to the next place, with the stated jumps that explain its length."""
@@ -234,11 +243,6 @@ class _Knots:
         self.s.append(s)
         self.km.append(km)
         self.piece.append(self.piece[-1] if self.piece else 0)
-
-
-def _is_before(jump: Jump, s: float, km: float) -> bool:
-    """Return whether a jump lies on the axis before a place of which the kilometre is known."""
-    return jump.ahead_km <= km and s - 1000 * (km - jump.ahead_km) >= SAME_PLACE_M
 
 
 def _not_on_axis(jump: Jump) -> RailExtractError:

@@ -19,7 +19,7 @@ from ..disk import writing
 from ..errors import OffCloudError, OffRailError
 from ..grow.growth import Growth, Stop
 from ..grow.heads import OnHeads
-from ..grow.seeds import Growths
+from ..grow.seeds import APART, Growths, apart_first
 from ..grow.settings import GrowSettings
 from ..polyline import Polyline
 from ..progress import SILENT, Progress
@@ -124,15 +124,14 @@ def grow_all(
     Parameters and errors are those of `grow_files`.
     """
     reading, growing = progress.divide((1.0, 1.0))
-    local = [request.zero.to_local(np.column_stack([seed[:, :2], np.zeros(len(seed))]))[:, :2] for seed in seeds]
-    places = [Polyline(seed).resampled(LINE_STEP_M).xyz if len(seed) > 1 else seed for seed in local]
-    places = _in_cloud(request, places)
+    owner, places = _in_cloud(request, seeds)
     request.announce(progress)
-    cloud = Cloud(request, np.concatenate(places), settings, folder, reading)
+    cloud = Cloud(request, places, settings, folder, reading)
     progress.status("Following the rails")
-    growths = Growths(cloud.heads, settings)
-    # From both ends of a line, and from those of its places that no rail has reached.
-    is_on = [growths.add((*seed[:1], *seed[:0:-1]), share) for seed, share in zip(places, growing.split(len(places)))]
+    growths, is_on = Growths(cloud.heads, settings), np.zeros(len(seeds), dtype=bool)
+    order = apart_first(places, APART * settings.parameters.max_length_m).tolist()
+    for at, share in zip(order, growing.split(len(order))):
+        is_on[owner[at]] |= growths.add(places[at], share)
     growths.reach_on(progress)
     parameters = settings.parameters
     if not growths.grown:
@@ -140,9 +139,9 @@ def grow_all(
             f"No seed is on a rail: put seeds within {parameters.search_m:g} m of railheads that stand "
             f"{parameters.min_height_m:g} m above the bed, and check the rail standard and the unit of the coordinates."
         )
-    missed = is_on.count(False)
+    missed = int(np.count_nonzero(~is_on))
     if missed:
-        progress.warning(f"{missed} of {len(places)} seeds are not on a rail: move them onto railheads.")
+        progress.warning(f"{missed} of {len(seeds)} seeds are not on a rail: move them onto railheads.")
     return cloud, growths
 
 
@@ -176,19 +175,26 @@ class Cloud:
         return read_stored(files_of(key, self._sorted), POINT)
 
 
-def _in_cloud(request: Request, seeds: Sequence[np.ndarray]) -> list[np.ndarray]:
-    """Return the places of each seed, (k, 2), that may be in the cloud.
+def _in_cloud(request: Request, seeds: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Return the seed, (k,) int, and the place, (k, 2) metres, of all places of seeds that may be in the cloud.
 
     Raises
     ------
     OffCloudError
         None is.
     """
-    boxes = [box_of(request, [header.extent]) for header in request.headers]
-    found = [seed[_inside(seed, boxes)] for seed in seeds]
-    if not any(map(len, found)):
+    parts = [_places(request.zero.to_local(np.column_stack([seed[:, :2], np.zeros(len(seed))]))) for seed in seeds]
+    owner, places = np.repeat(np.arange(len(seeds)), [len(part) for part in parts]), np.concatenate(parts)
+    inside = _inside(places, [box_of(request, [header.extent]) for header in request.headers])
+    if not inside.any():
         raise OffCloudError("No seed is in the cloud: check the place and the coordinate system of the seeds.")
-    return found
+    return owner[inside], places[inside]
+
+
+def _places(seed: np.ndarray) -> np.ndarray:
+    """Return the places at which a seed, (k, 3) metres, looks for rails, (n, 2): of a line, its ends first."""
+    xy = Polyline(seed).resampled(LINE_STEP_M).xy if len(seed) > 1 else seed[:, :2]
+    return np.concatenate([xy[:1], xy[:0:-1]])
 
 
 def _inside(xy: np.ndarray, boxes: Sequence[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:

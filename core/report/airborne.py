@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..airborne.cross_sections import STATION_M
 from ..airborne.remarks import FLIGHT
-from ..airborne.sections import STATION_M
 from ..airborne.survey import AirborneTrack, Survey
 from ..progress import counted
 from .listing import OFF_RAIL_MM, Finding

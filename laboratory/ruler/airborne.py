@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 
 from ...core.airborne.files import survey_files
 from ...core.airborne.fitting import REASONS, STATION_M
-from ...core.airborne.run import Run
+from ...core.airborne.reading import Run
 from ...core.airborne.survey import SWITCH, AirborneTrack, Guide, Survey
 from ...core.clouds.points import ask
 from ...core.parameters import AirborneParameters

@@ -186,10 +186,6 @@ class ParameterValues(Values):
         prepare_system(source.header.frame.crs_wkt)
         return source
 
-    def axis_crs(self) -> QgsCoordinateReferenceSystem:
-        """Return the coordinate system of AXIS."""
-        return self._line_source("AXIS").sourceCrs()
-
     def source(self, name: str) -> LayerSource:
         """Return a vector layer or a table.
 
@@ -204,8 +200,9 @@ class ParameterValues(Values):
         from ...core.jobs.lines import system_of
         from ..reading.layers import LayerSource
 
-        one = next(one for one in self.job.parameters if one.name == name)
-        has_lines = isinstance(one, kinds.LayerInput) and one.kinds == (kinds.LINE,)
+        layers = (one for one in self.job.parameters if isinstance(one, kinds.LayerInput))
+        one = next(one for one in layers if one.name == name)
+        has_lines = one.kinds == (kinds.LINE,)
         source = LayerSource(name, self._line_source(name) if has_lines else self.table(name), self.context)
         if has_lines and not one.transformed:
             system_of(source.crs_wkt, SILENT)

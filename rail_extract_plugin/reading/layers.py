@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -34,6 +35,11 @@ CHORD_TOLERANCE_M = 0.0005
 MIXED = "JSON"
 """Type that QGIS gives to a field with values of several types: it takes them for objects, and is left with none."""
 
+OBJECTS = (
+    "{} has objects, or both numbers and texts, in {}: objects become texts, and QGIS drops numbers and texts that are "
+    "in one field."
+)
+
 GEOMETRY_AS_IT_IS = QgsProcessingFeatureSource.Flag.FlagSkipGeometryValidityChecks
 
 KINDS = {
@@ -62,21 +68,26 @@ class LayerSource(Source):
         self.name, self.source, self._context = name, source, context
         self.crs_wkt = wkt_of(source.sourceCrs()) or None
         self.fields, self.count = source.fields().names(), source.featureCount()
+        kind = QgsWkbTypes.geometryType(source.wkbType())
+        is_table = kind == QgsWkbTypes.GeometryType.NullGeometry
+        self.kinds = {KINDS[kind]} if kind in KINDS else set() if is_table else set(KINDS.values())
+        objects = [field.name() for field in source.fields() if field.typeName() == MIXED]
+        self.notices = [OBJECTS.format(name, ", ".join(objects))] if objects else []
 
     def rows(self) -> Iterator[tuple[int, Row]]:
         """Yield number and values of each feature."""
-        return ((feature.id(), Row(feature)) for feature in self._stored())
+        return ((feature.id(), Row(feature)) for feature in self.stored())
 
     def features(self, crs_wkt: str | None) -> Iterator[Feature]:
         """Yield the features in a coordinate system."""
         chord = CHORD_TOLERANCE_M / unit_in_plan(crs_wkt or self.crs_wkt)
-        for feature, shape in self.moved(system(crs_wkt)):
+        for feature, shape in self._moved(crs_wkt):
             bounds, parts = bounds_of(feature.geometry()), _parts(shape, chord) if shape else []
-            yield Feature(feature.id(), Row(feature), bounds, parts, shape is None)
+            yield Feature(feature.id(), Row(feature), bounds, parts, shape is None, partial(_middle, shape))
 
     def rings(self, crs_wkt: str | None) -> list[np.ndarray]:
         """Return the rings of the polygons and of their holes; overlaps count once."""
-        shapes = [shape.makeValid() for _, shape in self.moved(system(crs_wkt)) if shape and not shape.isNull()]
+        shapes = [shape.makeValid() for _, shape in self._moved(crs_wkt) if shape and not shape.isNull()]
         united = QgsGeometry.unaryUnion(shapes)
         _straighten(united, CHORD_TOLERANCE_M)
         polygons = [part for part in united.constParts() if isinstance(part, QgsPolygon)] if shapes else []
@@ -86,15 +97,16 @@ class LayerSource(Source):
             for ring in (part.exteriorRing(), *(part.interiorRing(at) for at in range(part.numInteriorRings())))
         ]
 
-    def moved(self, crs: QgsCoordinateReferenceSystem) -> Iterator[tuple[QgsFeature, QgsGeometry | None]]:
+    def stored(self) -> Iterator[QgsFeature]:
+        """Yield the features as they are."""
+        return self.source.getFeatures(QgsFeatureRequest(), GEOMETRY_AS_IT_IS)
+
+    def _moved(self, crs_wkt: str | None) -> Iterator[tuple[QgsFeature, QgsGeometry | None]]:
         """Yield features with their geometries in another coordinate system, None where one has no place there."""
-        change = QgsCoordinateTransform(self.source.sourceCrs(), crs, self._context.transformContext())
-        for feature in self._stored():
+        change = QgsCoordinateTransform(self.source.sourceCrs(), system(crs_wkt), self._context.transformContext())
+        for feature in self.stored():
             shape = QgsGeometry(feature.geometry())
             yield feature, shape if transform(shape, change) else None
-
-    def _stored(self) -> Iterator[QgsFeature]:
-        return self.source.getFeatures(QgsFeatureRequest(), GEOMETRY_AS_IT_IS)
 
 
 class Row(Mapping[str, Any]):
@@ -172,6 +184,14 @@ def wkt_of(crs: QgsCoordinateReferenceSystem) -> str:
     return crs.toWkt(QgsCoordinateReferenceSystem.WktVariant.WKT_PREFERRED)
 
 
+def _middle(shape: QgsGeometry) -> np.ndarray:
+    """Return where a geometry counts, (2,)."""
+    kind = KINDS.get(QgsWkbTypes.geometryType(shape.wkbType()))
+    point = shape.interpolate(shape.length() / 2) if kind == LINE else shape.centroid()
+    point = shape.pointOnSurface() if kind == POLYGON else point
+    return np.full(2, np.nan) if point.isNull() else np.array([point.constGet().x(), point.constGet().y()])
+
+
 def _straighten(shape: QgsGeometry, chord: float) -> None:
     """Replace curves by chords that stay within a distance."""
     shape.convertToStraightSegment(chord, QgsAbstractGeometry.SegmentationToleranceType.MaximumDifference)
@@ -184,9 +204,9 @@ def _parts(shape: QgsGeometry, chord: float) -> list[tuple[str, np.ndarray]]:
     _straighten(shape, chord)
     found = []
     for part in shape.constParts():
-        kind = KINDS.get(QgsWkbTypes.geometryType(part.wkbType()))
+        kind = KINDS.get(QgsWkbTypes.geometryType(part.wkbType()), "")
         line = part.exteriorRing() if kind == POLYGON else part
-        xyzm = [(one.x(), one.y(), one.z(), one.m()) for one in line.vertices()] if kind else []
-        if xyzm:
+        xyzm = [(one.x(), one.y(), one.z(), one.m()) for one in line.vertices()]
+        if kind and xyzm:
             found.append((kind, np.array(xyzm, dtype=float)))
     return found

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from .clouds import RAIL, SHAPES, write_copc, write_las, write_laz, write_vpc
-from .mutators import mutator_for
+from .mutators import damaged
 
 LINES = ("gpkg", "geojson", "shp")
 """Formats of rails."""
@@ -64,7 +64,7 @@ class Kind:
         if self.remake is not None and rng.random() < 0.5:
             self.remake(path, rng)
         else:
-            path.write_bytes(mutator_for(path)(path.read_bytes(), rng))
+            path.write_bytes(damaged(path, rng))
         return path
 
     def copied(self, folder: Path, path: Path) -> Path:

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from rail_extract.core.airborne.cross_sections import Sections
+from rail_extract.core.airborne.curves import differences, draw_together, smooth
 from rail_extract.core.airborne.ridges import Fit
-from rail_extract.core.airborne.sections import Sections
-from rail_extract.core.airborne.together import draw_together
 from rail_extract.core.polyline import Polyline
 
 LENGTH_M, RADIUS_M, APART_M, NOISE_M = 400.0, 450.0, 4.0, 0.06
@@ -65,3 +65,18 @@ def test_tracks_that_part_do_not_pull_each_other():
     found = [sections(1, (), 0.01), sections(2, (), 0.01)]
     for line, one, curve in zip(lines, found, draw_together(lines, found)):
         assert np.abs(errors(line, one, curve)).max() < 0.04
+
+
+def test_curve_and_covariance_are_those_of_the_full_matrix():
+    rng = np.random.RandomState(1)
+    values, weight = rng.normal(size=(150, 2)), rng.uniform(0, 100, 150)
+    weight[40:50] = 0
+    for order in (2, 3):
+        found = smooth(values, weight, differences(150, order), 0.05)
+        difference = np.diff(np.eye(150), order, axis=0)
+        matrix = np.diag(weight) + difference.T @ difference / 0.05**2
+        inverse = np.linalg.inv(matrix)
+        assert np.allclose(found.values, inverse @ (weight[:, None] * values), atol=1e-6)
+        assert np.allclose(found.variance, np.diag(inverse), rtol=1e-6)
+        squares = ((difference @ found.values) ** 2).sum(axis=1)
+        assert np.allclose(found.bend - squares, np.diag(difference @ inverse @ difference.T), rtol=1e-5)

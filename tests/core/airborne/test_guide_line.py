@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from rail_extract.core.airborne.axis import axis_of_guide
+from rail_extract.core.airborne.guide_line import axis_of_guide
 
 
 def arc(radius_m, step_m, length_m=400.0):

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..polyline import Polyline
-from .corridor import Corridor
+from .guide_line import Corridor
 from .ridges import HALF_M, Fit, Shape, binned, fit, windows
 
 STATION_M = 10.0

@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .corridor import Corridor
+from .cross_sections import STATION_M
+from .guide_line import Corridor
 from .ridges import HALF_M, Shape, binned, fit, windows
-from .sections import STATION_M
 
 LONG = 7
 """Sections that are looked at as one: one section may be hidden, or mislead."""

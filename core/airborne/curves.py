@@ -9,12 +9,15 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import block_diag, csr_matrix, vstack
+from scipy.sparse import block_diag, csr_matrix, diags, vstack
 
 from ..polyline import Polyline, cross
-from .curve import differences, smooth
-from .joint import parallel
-from .sections import STATION_M, Sections
+from .cross_sections import STATION_M, Sections
+from .search import parallel
+
+LITTLE = 1e-12
+"""Added to the diagonal, so that a matrix without any data can be solved."""
+
 
 STRAIGHT_M = 0.004
 """Standard deviation of the third differences of a track in plan, over 10 m, where its curvature does not change."""
@@ -59,6 +62,64 @@ TURNED = 0.02
 
 FOOT_ROUNDS = 2
 """Rounds of the search for the place beside a station on a parallel line; the first one starts at a vertex."""
+
+
+@dataclass(frozen=True)
+class Smooth:
+    """A smooth curve.
+
+    Attributes
+    ----------
+    values : (n, d) array
+    covariance : (n, n) array
+        That of the curve, if each place has the variance 1 / weight.
+    rows : (k, n) matrix
+        The differences that are penalised.
+    """
+
+    values: np.ndarray
+    covariance: np.ndarray
+    rows: csr_matrix
+
+    @property
+    def variance(self) -> np.ndarray:
+        """Variance of each place, (n,)."""
+        return np.diag(self.covariance)
+
+    @property
+    def bend(self) -> np.ndarray:
+        """Expected square of each penalised difference, (k,): that of the curve's, and its variance."""
+        spread = self.rows.multiply(self.rows @ self.covariance).sum(axis=1)
+        return ((self.rows @ self.values) ** 2).sum(axis=1) + np.asarray(spread).ravel()
+
+
+def smooth(values: np.ndarray, weight: np.ndarray, rows: csr_matrix, sigma: float | np.ndarray) -> Smooth:
+    """Return the curve that balances places and smoothness.
+
+    Parameters
+    ----------
+    values : (n, d) array
+        Places; those with a weight of 0 may hold any number.
+    weight : (n,) array
+        1 / variance of each.
+    rows : (k, n) matrix
+        Differences that are small, such as those of `differences`.
+    sigma : float or (k,) array
+        Their standard deviation.
+    """
+    stiffness = np.broadcast_to(1 / np.square(sigma), rows.shape[0])
+    matrix = (rows.T @ diags(stiffness) @ rows).toarray()
+    matrix[np.diag_indices(len(matrix))] += weight + LITTLE
+    covariance = np.linalg.inv(matrix)
+    return Smooth(covariance @ (weight[:, None] * values), covariance, rows)
+
+
+def differences(count: int, order: int) -> csr_matrix:
+    """Return the differences of some order between places at equal steps, (count - order, count)."""
+    if count <= order:
+        return csr_matrix((0, count))
+    weights = np.diff(np.eye(order + 1), order, axis=0)[0]
+    return diags(weights, range(order + 1), shape=(count - order, count), format="csr")
 
 
 @dataclass(frozen=True)
