@@ -11,6 +11,7 @@ import numpy as np
 
 from ..alignment.elements import Alignment
 from ..alignment.stations import measured
+from ..checks.listing import Finding, list_findings
 from ..fields import (
     AXES,
     CENTERLINES,
@@ -31,7 +32,6 @@ from ..fields import (
 from ..frame import LocalFrame
 from ..progress import SILENT, Progress
 from ..rails import Centerline, RailLine, RailNetwork, TrackGeometry
-from ..report import Finding, list_findings
 from .table import rows
 
 if TYPE_CHECKING:
