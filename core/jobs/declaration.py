@@ -256,7 +256,7 @@ class Job:
     pages : tuple of str
         Pages of the guide to which the help links.
     call : str
-        Name as a function of Python, and with hyphens as a command; empty if there is none yet.
+        Name as a function of Python, and with hyphens as a command; empty for what sets up QGIS.
     check : callable
         Checks the values before a run, in the main thread; it raises a `RailExtractError`.
     run : callable
