@@ -30,18 +30,7 @@ PRECISION_M = 1e-5
 
 
 def write_ifc(path: Path, alignments: Sequence[Alignment], delivery: Delivery, progress: Progress = SILENT) -> None:
-    """Write alignments whose coordinates are in metres.
-
-    Parameters
-    ----------
-    alignments : sequence of Alignment
-        At least one; all in the same frame.
-
-    Raises
-    ------
-    OSError
-        The file cannot be written.
-    """
+    """Write alignments of one frame, with coordinates in metres; there is at least one."""
     model = _Model(alignments[0].frame.origin, delivery, progress)
     alone = [model.add(name, alignment) for name, alignment in zip(names(alignments), alignments)]
     model.relate("IfcRelAggregates", model.project, [*alone], "alignments")
@@ -232,7 +221,7 @@ def _plan_segment(file: StepFile, one: PlanElement, transition: Enum) -> Segment
 
 
 def vertical_segments(file: StepFile, alignment: Alignment, z_of_origin: float) -> list[Segment]:
-    """Add the grades and parabolas."""
+    """Add the grades and parabolas, given the height of the zero of local heights."""
     bends = [2 * (one.curvature,) for one in alignment.vertical]
     made = [
         _vertical_segment(file, alignment, one, z_of_origin, how)
@@ -267,7 +256,7 @@ def _slope_length(one: VerticalElement) -> float:
 
 
 def cant_segments(file: StepFile, alignment: Alignment, distance_m: float) -> list[Segment]:
-    """Add constant cant and ramps."""
+    """Add constant cant and ramps, given the distance between the middles of the heads."""
     last = alignment.cant[-1]
     after = CantElement(last.s_to, 0.0, last.cant_to_m, last.cant_to_m)
     ways = [SMOOTH] * len(alignment.cant) + [BROKEN]
@@ -317,7 +306,7 @@ def line(file: StepFile) -> Ref:
 
 
 def placement_2d(file: StepFile, place: Ref, heading: float) -> Ref:
-    """Add a placement in a plane."""
+    """Add a placement in a plane, of which the x axis has a direction, radians."""
     direction = file.add("IfcDirection", (math.cos(heading), math.sin(heading)))
     return file.add("IfcAxis2Placement2D", place, direction)
 

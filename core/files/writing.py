@@ -63,13 +63,7 @@ def _write_for_others(layer: AnyLayer, destination: Destination, frame: LocalFra
 
 
 def _drawn(layer: Copy, name: str) -> tuple[Product, bool, list[Shape]]:
-    """Return a copy as lines or points with its fields: their product, whether they are lines, and the shapes.
-
-    Raises
-    ------
-    ParameterError
-        They are polygons, or both lines and points.
-    """
+    """Return a copy as lines or points with its fields: their product, whether they are lines, and the shapes."""
     parts, numbers = shapely.get_parts(layer.originals.shapes, return_index=True)
     kinds = {part.geom_type for part in parts}
     if len(kinds) > 1 or "Polygon" in kinds:
@@ -136,7 +130,7 @@ def _geometry(layer: Layer, frame: LocalFrame) -> np.ndarray:
 
 
 def measured_line(vertices: np.ndarray) -> bytes:
-    """Return a line of x, y, perhaps z, and M, (n, 3) or (n, 4), as well-known binary; shapely writes no M."""
+    """Return a line with x, y, perhaps z, and M values, (n, 3 or 4), as well-known binary: shapely writes no M."""
     count, size = vertices.shape
     return struct.pack("<BII", 1, {3: LINE_M, 4: LINE_ZM}[size], count) + vertices.astype("<f8").tobytes()
 
