@@ -14,7 +14,6 @@ from qgis.core import (
     QgsCoordinateReferenceSystem,
     QgsProcessingAlgorithm,
     QgsProcessingContext,
-    QgsProcessingFeatureSource,
     QgsProcessingOutputLayerDefinition,
     QgsProperty,
     QgsWkbTypes,
@@ -74,10 +73,11 @@ class ParameterValues(Values):
     def __getitem__(self, name: str) -> Any:
         """Return the value of a parameter, by its kind; None if it is empty, and the WKT of a coordinate system."""
         one = next(one for one in self.job.parameters if one.name == name)
-        if isinstance(one, kinds.Number):
-            number = self.optional_number(name) if one.optional else self.number(name)
-            return int(number) if one.whole and number is not None else number
         return READERS[type(one)](self, one)
+
+    def read_as(self, kind: str, name: str) -> Any:
+        """Return a value as QGIS reads it for a kind of parameters."""
+        return getattr(self.algorithm, f"parameterAs{kind}")(self.parameters, name, self.context)
 
     @property
     def command(self) -> str:
@@ -119,49 +119,15 @@ class ParameterValues(Values):
         """Return the file of an output that is wanted."""
         return self.algorithm.destinations.get(name) or Destination.at(self.path(name))
 
-    def number(self, name: str) -> float:
-        """Read a number.
-
-        Raises
-        ------
-        ParameterError
-            The value is NaN, which QGIS accepts.
-        """
-        number = self.algorithm.parameterAsDouble(self.parameters, name, self.context)
-        if math.isnan(number):
-            raise ParameterError(f"{name} can't be nan: give a number.")
-        return number
-
-    def optional_number(self, name: str) -> float | None:
-        """Read a number that may be left empty."""
-        return self.number(name) if self.filled(name) else None
-
     def runner(self) -> AbstractContextManager[Runner]:
         """Provide the runner with as many processes as WORKERS asks for."""
         from ...core.run.processes import workers
 
-        return workers(int(self.number("WORKERS")), known_interpreter)
-
-    def flag(self, name: str) -> bool:
-        """Read a choice of yes or no."""
-        return self.algorithm.parameterAsBoolean(self.parameters, name, self.context)
-
-    def text(self, name: str) -> str:
-        """Read a text."""
-        return self.algorithm.parameterAsString(self.parameters, name, self.context)
-
-    def choice(self, name: str) -> str:
-        """Read the static string of an enum."""
-        return self.algorithm.parameterAsEnumString(self.parameters, name, self.context)
+        return workers(self["WORKERS"], known_interpreter)
 
     def filled(self, name: str) -> bool:
         """Return whether a value was entered."""
         return self.parameters.get(name) not in (None, "", NULL)
-
-    def file(self, name: str) -> Path | None:
-        """Read a file that may be left empty."""
-        given = self.algorithm.parameterAsFile(self.parameters, name, self.context)
-        return Path(given) if given else None
 
     def wanted(self, name: str) -> bool:
         """Return whether an output is to be written; the batch dialog gives an empty definition for a skipped one."""
@@ -169,7 +135,7 @@ class ParameterValues(Values):
 
     def output_file(self, name: str) -> str:
         """Return the file of an output; QGIS chooses the name of a temporary one during the run."""
-        return self.algorithm.parameterAsFileOutput(self.parameters, name, self.context)
+        return self.read_as("FileOutput", name)
 
     def raster(self, name: str) -> RasterSource:
         """Return a rail raster, whose header is read in the main thread."""
@@ -179,7 +145,7 @@ class ParameterValues(Values):
         from ...core.files.rail_rasters import RasterSource
         from ..reading.rasters import open_with_gdal
 
-        layer = self.algorithm.parameterAsRasterLayer(self.parameters, name, self.context)
+        layer = self.read_as("RasterLayer", name)
         if layer is None:
             raise RasterError(f"{name} is not a readable raster: give the output of Rasterize Rail Points.")
         source = RasterSource(Path(layer.source()), open_with_gdal)
@@ -203,27 +169,15 @@ class ParameterValues(Values):
         layers = (one for one in self.job.parameters if isinstance(one, kinds.LayerInput))
         one = next(one for one in layers if one.name == name)
         has_lines = one.kinds == (kinds.LINE,)
-        source = LayerSource(name, self._line_source(name) if has_lines else self.table(name), self.context)
+        layer = self.read_as("Source", name)
+        if layer is None:
+            raise RailExtractError(f"{name} is not a readable layer: choose another one.")
+        if has_lines:
+            _check_lines(name, layer.wkbType())
+        source = LayerSource(name, layer, self.context)
         if has_lines and not one.transformed:
             system_of(source.crs_wkt, SILENT)
             prepare_system(source.crs_wkt)
-        return source
-
-    def table(self, name: str) -> QgsProcessingFeatureSource:
-        """Return a layer or a table."""
-        source = self.algorithm.parameterAsSource(self.parameters, name, self.context)
-        if source is None:
-            raise RailExtractError(f"{name} is not a readable layer: choose another one.")
-        return source
-
-    def _line_source(self, name: str) -> QgsProcessingFeatureSource:
-        """Return a layer that may have lines."""
-        source = self.table(name)
-        kind = source.wkbType()
-        if QgsWkbTypes.geometryType(kind) in TYPES_WITHOUT_LINES:
-            raise RailExtractError(
-                f"{name} has the geometry type {QgsWkbTypes.displayString(kind)}: give a line layer."
-            )
         return source
 
     def cloud(self, name: str = "INPUT") -> CloudSource:
@@ -245,8 +199,8 @@ class ParameterValues(Values):
         """Return the place of SEED in a coordinate system, (1, 2)."""
         from ..reading.layers import read_place
 
-        place = self.algorithm.parameterAsPoint(self.parameters, "SEED", self.context)
-        own = self.algorithm.parameterAsPointCrs(self.parameters, "SEED", self.context)
+        place = self.read_as("Point", "SEED")
+        own = self.read_as("PointCrs", "SEED")
         return [read_place(place, own, system(crs_wkt), self.context)]
 
     def projected_crs(self) -> QgsCoordinateReferenceSystem:
@@ -257,7 +211,7 @@ class ParameterValues(Values):
         ParameterError
             It is not a coordinate system, or it is in degrees.
         """
-        crs = self.algorithm.parameterAsCrs(self.parameters, "CRS", self.context)
+        crs = self.read_as("Crs", "CRS")
         if self.filled("CRS") and not crs.isValid():
             raise ParameterError(f"CRS {self.parameters['CRS']} is not a coordinate system: choose one from the list.")
         if crs.isGeographic():
@@ -293,12 +247,32 @@ def destination_text(value: Any, context: QgsProcessingContext) -> str:
     return value or ""
 
 
+def _check_lines(name: str, kind: QgsWkbTypes.Type) -> None:
+    """Refuse a layer whose type of geometry has no lines."""
+    if QgsWkbTypes.geometryType(kind) in TYPES_WITHOUT_LINES:
+        raise RailExtractError(f"{name} has the geometry type {QgsWkbTypes.displayString(kind)}: give a line layer.")
+
+
+def _number(values: ParameterValues, one: kinds.Number) -> float | None:
+    """Read a number that is not NaN, which QGIS accepts."""
+    if one.optional and not values.filled(one.name):
+        return None
+    number = values.read_as("Double", one.name)
+    if math.isnan(number):
+        raise ParameterError(f"{one.name} can't be nan: give a number.")
+    return int(number) if one.whole else number
+
+
 def _chosen(values: ParameterValues, one: kinds.Choice) -> Any:
     """Read a choice: one id, several, or the place of one."""
-    algorithm, given = values.algorithm, (values.parameters, one.name, values.context)
-    if one.numbered:
-        return algorithm.parameterAsEnum(*given)
-    return tuple(algorithm.parameterAsEnumStrings(*given)) if one.several else values.choice(one.name)
+    if one.several:
+        return tuple(values.read_as("EnumStrings", one.name))
+    return values.read_as("Enum" if one.numbered else "EnumString", one.name)
+
+
+def _file(values: ParameterValues, one: kinds.FileInput) -> Path | None:
+    given = values.read_as("File", one.name)
+    return Path(given) if given else None
 
 
 def _system(values: ParameterValues, one: kinds.System) -> str | None:
@@ -308,11 +282,12 @@ def _system(values: ParameterValues, one: kinds.System) -> str | None:
 
 
 READERS: dict[type, Callable[[ParameterValues, Any], Any]] = {
-    kinds.Flag: lambda values, one: values.flag(one.name),
+    kinds.Number: _number,
+    kinds.Flag: lambda values, one: values.read_as("Boolean", one.name),
     kinds.Choice: _chosen,
-    kinds.Text: lambda values, one: values.text(one.name),
-    kinds.FieldInput: lambda values, one: values.text(one.name),
-    kinds.FileInput: lambda values, one: values.file(one.name),
+    kinds.Text: lambda values, one: values.read_as("String", one.name),
+    kinds.FieldInput: lambda values, one: values.read_as("String", one.name),
+    kinds.FileInput: _file,
     kinds.System: _system,
 }
 """Functions that read a value, by the kind of the parameter."""
