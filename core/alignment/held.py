@@ -46,7 +46,7 @@ def given_of(fixed: Alignment, first_m: float, length_m: float) -> Given:
 
     The first and the last element are continued to the ends of the part.
     """
-    plan = [_moved(one, -first_m) for one in fixed.plan]
+    plan = [moved(one, -first_m) for one in fixed.plan]
     bounds = _bounds(fixed.track_id, plan, 0.0, length_m)
     if plan[0].s_to <= 0.0 or (len(plan) > 1 and bounds[-2] >= length_m):
         raise ParameterError(
@@ -90,7 +90,7 @@ def noted(one: PlanElement, **figures: Any) -> PlanElement:
     return replace(one, figures=Figures(r_fit_m=radius, s_fit_m=one.s_from, **figures))
 
 
-def _moved(one: PlanElement, by_m: float) -> PlanElement:
+def moved(one: PlanElement, by_m: float) -> PlanElement:
     """Return an element that starts farther along the line."""
     noted_m = None if one.figures.s_fit_m is None else one.figures.s_fit_m + by_m
     return replace(one, s_from=one.s_from + by_m, figures=replace(one.figures, s_fit_m=noted_m))
