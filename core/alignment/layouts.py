@@ -15,11 +15,10 @@ from .elements import CantElement, Figures, PlanElement, VerticalElement
 from .held import Given
 from .noise import Noise, estimated, shared_covariance
 from .plane_fit import PlanFit, Points
-from .signals import FINAL_ROUNDS, FLOOR_M, STILL_M, Signal, refitted, started
+from .signals import FINAL_ROUNDS, FLOOR_M, PLAN, STILL_M, Signal, refitted, started
 
-SNAP_SIGMAS, SNAP_M = 2.58, 10.0
-"""A ramp's end takes the place of a clothoid's end within this many standard errors (1 % level), and metres: the end of
-a ramp of 5 mm over 150 m is known to 3 m."""
+SNAP_SIGMAS = 2.58
+"""A ramp's end takes the place of a clothoid's end within this many standard errors: the 1 % level."""
 
 
 def heights(chain: Chain, signal: Signal, noise: Noise, errors: Errors) -> tuple[VerticalElement, ...]:
@@ -91,17 +90,13 @@ def _snapped(
     if not len(ends) or not len(chain.p):
         return chain, np.zeros(len(chain.p), dtype=bool)
     nearest = ends[np.abs(chain.p[:, None] - ends).argmin(axis=1)]
-    limit = np.minimum(SNAP_SIGMAS * errors.s[1:], SNAP_M)
-    moves = (np.abs(nearest - chain.p) <= limit) & ~np.isin(nearest, chain.p)
+    moves = (np.abs(nearest - chain.p) <= SNAP_SIGMAS * errors.s[1:]) & ~np.isin(nearest, chain.p)
     p = np.where(moves, nearest, chain.p)
     if (np.diff(np.concatenate([[chain.start], p, [chain.end]])) <= 0).any():
         return chain, np.zeros(len(chain.p), dtype=bool)
     moved = replace(chain, p=p, q=p.copy())
     return refitted(moved, signal, noise, np.inf), moves
 
-
-LEAST_DEGREE, LARGEST_DEGREE = 0.0, 3.0
-"""Limits of the degree of a polynomial that follows the errors of an element as much as the fit does."""
 
 SURE = 3.0
 """Standard errors by which the distances of the points from the fitted curve have to show misalignment."""
@@ -136,7 +131,7 @@ def remaining(fit: PlanFit, points: Points, tolerance_m: float) -> Noise:
     for part in parts:
         degree = _spent(fit.jacobian[part], points.weight[part], covariance) - 1.0
         used = points.weight[part] > 0
-        pieces.append((fit.across[part][used], float(np.clip(degree, LEAST_DEGREE, LARGEST_DEGREE))))
+        pieces.append((fit.across[part][used], float(np.clip(degree, 0, PLAN.degrees[-1]))))
     step = float(points.s[-1]) / (len(points.s) - 1)
     found = estimated(pieces, step, FLOOR_M, SURE)
     return Noise(found.white_m, min(found.shared_m, tolerance_m), found.length_m)
