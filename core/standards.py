@@ -66,6 +66,11 @@ class RailStandard:
         return self.label.rpartition(",")[0]
 
     @property
+    def is_usual(self) -> bool:
+        """Whether the profile is that of the default."""
+        return self.name.rpartition("_")[0] == DEFAULT.rpartition("_")[0]
+
+    @property
     def description(self) -> str:
         """Region, profile, gauge and head width, as a list sorts them by region."""
         return f"{self.region}: {self.label}, head {1000 * self.head_width_m:g} mm"
@@ -220,24 +225,35 @@ def closest_standard(spacing_m: float, head_width_m: float) -> RailStandard | No
     Returns
     -------
     RailStandard or None
-        None if no standard has such a gauge.
+        None if no standard has such a gauge, nor rails as far apart: heads in blunt clouds, or more than heads in a
+        class, look wider than they are, and the distance is right nevertheless. The usual profile of a gauge stands
+        for the others then.
 
     Examples
     --------
     >>> closest_standard(1.0619, 0.0622).name
     'IN_75R_1000'
     """
-    gauge_m = spacing_m - head_width_m
-    nearest_m = min((one.gauge_m for one in STANDARDS.values()), key=lambda one: abs(one - gauge_m))
-    if abs(nearest_m - gauge_m) > SAME_GAUGE_M:
-        return None
+
+    def apart(standard: RailStandard) -> float:
+        return abs(standard.gauge_m + standard.head_width_m - spacing_m)
 
     def misfit(standard: RailStandard) -> float:
-        spacing_off_m = abs(standard.gauge_m + standard.head_width_m - spacing_m)
-        usual = standard.name.rsplit("_", 1)[0] == DEFAULT.rsplit("_", 1)[0]
-        return spacing_off_m + abs(standard.head_width_m - head_width_m) - SAME_M * usual
+        return apart(standard) + abs(standard.head_width_m - head_width_m) - SAME_M * standard.is_usual
 
-    return min((one for one in STANDARDS.values() if one.gauge_m == nearest_m), key=misfit)
+    gauge_m = spacing_m - head_width_m
+    nearest = min(STANDARDS.values(), key=lambda one: abs(one.gauge_m - gauge_m))
+    if abs(nearest.gauge_m - gauge_m) <= SAME_GAUGE_M:
+        return min(of_gauge(nearest.gauge_m), key=misfit)
+    nearest = min(STANDARDS.values(), key=apart)
+    if apart(nearest) > SAME_GAUGE_M:
+        return None
+    return min(of_gauge(nearest.gauge_m), key=lambda one: (not one.is_usual, apart(one)))
+
+
+def of_gauge(gauge_m: float) -> list[RailStandard]:
+    """Return the standards of a gauge."""
+    return [one for one in STANDARDS.values() if one.gauge_m == gauge_m]
 
 
 def _custom(gauge_m: float, head_width_m: float) -> RailStandard:

@@ -10,9 +10,9 @@ import numpy as np
 from ..airborne.cross_sections import STATION_M
 from ..airborne.remarks import FLIGHT
 from ..airborne.survey import AirborneTrack, Survey
-from ..progress import counted
-from .listing import OFF_RAIL_MM, Finding
-from .markup import made, metres, page, section, table, verdict_box
+from ..checks.listing import OFF_RAIL_MM, Finding
+from ..progress import counted, metres
+from .markup import made, page, section, table, verdict_box
 
 GOOD_SHARE, FAIR_SHARE = 0.95, 0.7
 """Shares of the guides' length that must be seen for a verdict of good, and of usable."""

@@ -49,7 +49,7 @@ from qgis.PyQt.QtWidgets import (
 )
 from qgis.utils import iface, loadPlugin, plugins, reloadPlugin, startPlugin, unloadPlugin
 
-RAW, SAMPLE, ARCHIVE = (os.environ[f"RAIL_EXTRACT_{name}"] for name in ("RAW", "SAMPLE", "ZIP"))
+RAW, BLUNT, SAMPLE, ARCHIVE = (os.environ[f"RAIL_EXTRACT_{name}"] for name in ("RAW", "BLUNT", "SAMPLE", "ZIP"))
 NAMES = (
     *("extractrails", "classifyrailpoints", "growrailpoints", "airbornecenterlines"),
     *("rasterizerailpoints", "frpdfcleanup", "vectorizerails"),
@@ -330,6 +330,9 @@ def raw(driver: Driver) -> Iterator:
     driver.keep("systems", {layer.name(): layer.crs().toWkt() for layer in layers})
     driver.keep("bars", [item.text() for item in iface.messageBar().items()])
     yield from _save_all(driver, log)
+    dialog.setParameters({"INPUT": BLUNT, "CLASSIFY": True, "STANDARD": "DETECT"})
+    driver.keep("blunt", (yield from press_run(dialog)).rpartition("starting")[2])
+    driver.picture("raw_blunt")
     yield from close(dialog)
 
 

@@ -111,6 +111,13 @@ def test_a_raw_cloud_without_the_tick_is_explained_and_its_rails_are_found(run_s
     assert "Review the findings" in found or "0 findings" in found
 
 
+def test_a_blunt_raw_cloud_is_searched_at_the_gauge_that_it_shows(run_scenario):
+    log = run_scenario("raw")["blunt"]
+    assert re.search(r"No standard has such heads: .* EN 60E1 \(UIC 60\), 1435 mm \(EN_60E1_1435\) is assumed", log)
+    assert "RAIL_COUNT: 2" in log.replace("'", "")
+    assert "Next: Run again as " in log
+
+
 def test_layers_of_a_cloud_without_a_system_have_none(run_scenario):
     session = run_scenario("raw")
     assert set(session["systems"].values()) == {""}
