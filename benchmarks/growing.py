@@ -13,9 +13,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from rail_extract.core.grow.growth import Growth, grow
+from rail_extract.core.grow.growth import APART, Growth, Growths, apart_first, grow
 from rail_extract.core.grow.heads import Rail
-from rail_extract.core.grow.seeds import APART, Growths, apart_first
 from rail_extract.core.grow.settings import GrowSettings
 from rail_extract.core.polyline import Polyline, project
 from rail_extract.laboratory.ruler.classification import truth

@@ -1,8 +1,8 @@
 """Write the versions and checksums of the packages that Install Packages downloads, for every system and Python.
 
 Run it before a release, after `pip install uv`, look at the difference, and run the tests: the plugin then installs
-exactly these files. PyTorch's own builds, CPU for Linux and CUDA for Windows, are on an index of their own: the list has
-none of them.
+exactly these files. The list has none of PyTorch's own builds, CPU for Linux and CUDA for Windows, which are on an
+index of their own.
 """
 
 from __future__ import annotations
