@@ -82,7 +82,6 @@ class Signal:
         Distance and value, metres.
     share : (n,) array
         How much each point counts, 1 for a measured one, 0 in a bridged gap.
-    kind : Kind
     """
 
     s: np.ndarray
@@ -101,18 +100,11 @@ class Signal:
 
 
 def noise_of(signal: Signal, tolerance_m: float, progress: Progress = SILENT) -> tuple[Noise, list[Polynomial]]:
-    """Return the noise of a signal, and the partition for it.
+    """Return the noise of a signal, with misalignment up to a tolerance, and the partition for it.
 
     The finer a partition is, the less is left as noise. From the errors of single points upwards, the noise is raised
     until a partition leaves no more than it was made for. Misalignment raises it at every step; where there is none,
     the first partition remains.
-
-    Parameters
-    ----------
-    signal : Signal
-    tolerance_m : float
-        Largest standard deviation of the misalignment.
-    progress : Progress
     """
     used = signal.share > 0
     s, y = signal.s[used], signal.y[used]
@@ -162,18 +154,9 @@ def _residuals(pieces: list[Polynomial], s: np.ndarray, y: np.ndarray) -> list[t
 def find_structure(
     signal: Signal, tolerance_m: float, least_m: float, jumps: bool, progress: Progress = SILENT
 ) -> tuple[Chain, Noise]:
-    """Return the chain that explains a signal, and the noise that is left.
+    """Return the chain that explains a signal, and the noise that is left; see `noise_of`.
 
-    Parameters
-    ----------
-    signal : Signal
-    tolerance_m : float
-        See `noise_of`.
-    least_m : float
-        Least length of a part or a ramp, metres.
-    jumps : bool
-        Whether the bend may jump; where it cannot change linearly, it always may.
-    progress : Progress
+    Parts and ramps have a least length, metres. Where the bend cannot change linearly, it may always jump.
     """
     first, second = progress.divide([1.0, 4.0])
     noise, pieces = noise_of(signal, tolerance_m, first)
@@ -256,19 +239,9 @@ def partition(
     ends: tuple[float, float],
     progress: Progress = SILENT,
 ) -> list[Polynomial]:
-    """Divide a signal into polynomials.
+    """Divide a signal into polynomials between two ends; its errors have a standard deviation, metres.
 
-    Parameters
-    ----------
-    s, y : (n,) array
-        Distance and signal, metres.
-    sigma : float
-        Standard deviation of the signal's errors, metres.
-    degrees : sequence of int
-        Degrees that a piece may have, each one more than the one before.
-    ends : (float, float)
-        Start of the first and end of the last piece.
-    progress : Progress
+    Each of the degrees that a piece may have is one more than the one before.
     """
     count = max(int(round((ends[1] - ends[0]) / BLOCK_M)), 1)
     bounds = np.linspace(*ends, count + 1)

@@ -93,7 +93,6 @@ class Copy:
     ----------
     originals : object
         Its features, as the front end has read them.
-    fields : tuple of Field
     columns : sequence of sequence
         Values of each further field, one per feature.
     """
@@ -127,15 +126,7 @@ def written_by_name(layer: AnyLayer) -> dict[str, Sequence[Any]]:
 
 
 def network_makers(network: RailNetwork, gauges_m: Sequence[float]) -> dict[str, Callable[[], Layer]]:
-    """Return the functions that make the layers of an extraction, by their names.
-
-    Parameters
-    ----------
-    network : RailNetwork
-        With the geometry of its tracks, for "quality" and "findings".
-    gauges_m : sequence of float
-        Gauges of the extraction.
-    """
+    """Return the functions that make the layers of an extraction by name; quality needs the geometry of tracks."""
     return {
         "rails": lambda: lines_layer(RAILS, network.rails),
         "centerlines": lambda: lines_layer(CENTERLINES, network.centerlines),

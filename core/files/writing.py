@@ -63,20 +63,15 @@ def _write_for_others(layer: AnyLayer, destination: Destination, frame: LocalFra
 
 
 def _drawn(layer: Copy, name: str) -> tuple[Product, bool, list[Shape]]:
-    """Return a copy as lines or points with its fields: their product, whether they are lines, and the shapes.
-
-    Raises
-    ------
-    ParameterError
-        They are polygons, or both lines and points.
-    """
+    """Return a copy as lines or points with its fields: their product, whether they are lines, and the shapes."""
     parts, numbers = shapely.get_parts(layer.originals.shapes, return_index=True)
     kinds = {part.geom_type for part in parts}
     if len(kinds) > 1 or "Polygon" in kinds:
         raise ParameterError(f"{name} can only have points, or only lines: choose a GeoPackage.")
     kinds_of = ({"i": int, "f": float}.get(values.dtype.kind, str) for values, _ in _columns(layer))
     fields = tuple(Field(name, kind, "") for name, kind in zip(written_by_name(layer), kinds_of))
-    rows = [[*own.values(), *more] for own, more in zip(layer.originals.rows(), zip(*layer.written_columns()))]
+    more = zip(*layer.written_columns())
+    rows = [[*own.values(), *values] for (_, own), values in zip(layer.originals.rows(), more)]
     shapes = [
         Shape(shapely.get_coordinates(part, include_z=True), rows[number]) for part, number in zip(parts, numbers)
     ]
@@ -135,13 +130,7 @@ def _geometry(layer: Layer, frame: LocalFrame) -> np.ndarray:
 
 
 def measured_line(vertices: np.ndarray) -> bytes:
-    """Return a line with M values as well-known binary, which shapely does not write.
-
-    Parameters
-    ----------
-    vertices : (n, 3) or (n, 4) array
-        x, y, perhaps z, and M.
-    """
+    """Return a line with x, y, perhaps z, and M values, (n, 3 or 4), as well-known binary: shapely writes no M."""
     count, size = vertices.shape
     return struct.pack("<BII", 1, {3: LINE_M, 4: LINE_ZM}[size], count) + vertices.astype("<f8").tobytes()
 

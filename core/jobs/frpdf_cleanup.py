@@ -42,14 +42,6 @@ def _planned(values: Values) -> tuple[RasterHeader, Model]:
 def model_for(header: RasterHeader, standard: RailStandard, name: str) -> Model:
     """Return the model that the user named, or that a raster names, or that fits its rails; check the cell size.
 
-    Parameters
-    ----------
-    header : RasterHeader
-    standard : RailStandard
-        The raster's rails.
-    name : str
-        Name of a model, or AUTO.
-
     Raises
     ------
     ModelError

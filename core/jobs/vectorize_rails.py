@@ -64,7 +64,6 @@ def moved(raster: RailRaster, frame: LocalFrame, other: LocalFrame) -> RailRaste
 
     Parameters
     ----------
-    raster : RailRaster
     frame, other : LocalFrame
         Present frame and new frame.
     """

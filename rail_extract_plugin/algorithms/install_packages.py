@@ -68,7 +68,7 @@ class InstallPackages(RailAlgorithm):
 
     def read(self, values: ParameterValues) -> Job:
         """Find what is missing."""
-        build = values.choice("TORCH")
+        build = values["TORCH"]
         if build == "CUDA" and sys.platform == "darwin":
             raise ParameterError("There is no CUDA on macOS: set TORCH to CPU.")
         needed = [package for package in PACKAGES if package.module not in OPTIONAL]
