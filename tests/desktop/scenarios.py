@@ -478,6 +478,8 @@ def _compare_lifted(driver: Driver, rails: QgsVectorLayer) -> Iterator:
     dialog = yield from open_dialog("comparetracks")
     dialog.setParameters({"REFERENCE": rails.id(), "INPUT": lifted.id()})
     driver.keep("comparison", (yield from press_run(dialog)))
+    page = Path(dialog.results()["REPORT"]).read_text(encoding="utf-8")
+    driver.keep("compared", re.findall("<h2>(.*?)</h2>", page))
     yield from close(dialog)
     (differences,) = (one for one in QgsProject.instance().mapLayers().values() if one.name().startswith("Differences"))
     iface.mapCanvas().setExtent(differences.extent())

@@ -363,6 +363,7 @@ def test_a_lift_of_all_lines_is_in_the_headline_and_in_the_map(run_scenario):
         "The later survey is shifted by +0.0 mm east, +0.0 mm north, +10.0 mm up; apart from that, nothing has moved"
     )
     assert shift in session["comparison"]
+    assert {"Rail 1 (left in track 1)", "Rail 2 (right in track 1)"} <= set(session["compared"])
     assert session["drawn"] == ["shifted with all lines, not moved otherwise"]
 
 
