@@ -249,6 +249,13 @@ def counted(count: int, one: str, many: str = "") -> str:
     return f"{count:,} {one if count == 1 else many or one + 's'}"
 
 
+def metres(length_m: float) -> str:
+    """Format a length for reading: 0.4 m, 39 m, 1,234 m, 12.3 km."""
+    if length_m >= 10_000:
+        return f"{length_m / 1000:,.1f} km"
+    return f"{length_m:.1f} m" if length_m < 10 else f"{length_m:,.0f} m"
+
+
 def written(value: float, form: str = ".1f") -> str:
     """Write a number, for messages; what rounds to 0 is 0, without a minus.
 

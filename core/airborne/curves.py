@@ -150,7 +150,6 @@ def draw_together(lines: Sequence[Polyline], found: Sequence[Sections]) -> list[
     ----------
     lines : sequence of Polyline
         On which the sections are seen.
-    found : sequence of Sections
     """
     stations = [one.stations_on(line) for line, one in zip(lines, found)]
     place = np.concatenate([line.at(t) for line, t in zip(lines, stations)])

@@ -14,9 +14,9 @@ from ..parameters import AirborneParameters
 from ..polyline import Polyline
 from ..progress import Progress
 from ..run.tasks import Context, Task
-from ..squares.grid import Key
-from ..squares.store import counts_of, files_of, read_stored
 from ..standards import STANDARDS
+from ..tiles.grid import Key
+from ..tiles.store import counts_of, files_of, read_stored
 from .cross_sections import STATION_M
 from .fitting import EMPTY, SEEN, Fitted, Stations, fit_tracks
 from .guide_line import axis_of_guide

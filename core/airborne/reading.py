@@ -21,8 +21,8 @@ from ..polyline import Polyline
 from ..progress import SILENT, Progress
 from ..run.loop import Runner
 from ..run.tasks import READ_S, Context, Task
-from ..squares.grid import Key
-from ..squares.store import SortedFile, append
+from ..tiles.grid import Key
+from ..tiles.store import SortedFile, append
 from .cross_sections import STATION_M
 from .ridges import HALF_M
 from .rivals import WIDE_M

@@ -32,8 +32,6 @@ class Given:
 
     Attributes
     ----------
-    chain : Chain
-    held : Held
     poses : (e, 3) array, optional
         Place and direction at the start of each element in plan; else they are those of the line.
     """
@@ -44,15 +42,9 @@ class Given:
 
 
 def given_of(fixed: Alignment, first_m: float, length_m: float) -> Given:
-    """Return the structure of the elements in plan.
+    """Return the structure of the elements in plan for a part of a line: where on the line it begins, and its length.
 
-    Parameters
-    ----------
-    fixed : Alignment
-    first_m : float
-        Where on the measured line the part begins that is fitted.
-    length_m : float
-        Length of that part; the table's first and last element are continued to its ends.
+    The first and the last element are continued to the ends of the part.
     """
     plan = [_moved(one, -first_m) for one in fixed.plan]
     bounds = _bounds(fixed.track_id, plan, 0.0, length_m)
@@ -74,15 +66,7 @@ def given_of(fixed: Alignment, first_m: float, length_m: float) -> Given:
 
 
 def given_along(track_id: Optional[int], shape: Sequence[Element], signal: Signal) -> Given:
-    """Return the structure of the elements in height or of cant.
-
-    Parameters
-    ----------
-    track_id : int or None
-    shape : sequence of VerticalElement or of CantElement
-    signal : Signal
-        Elements beyond its ends are left out.
-    """
+    """Return the structure of the elements in height or of cant; those beyond the ends of the signal are left out."""
     first, last = float(signal.s[0]), float(signal.s[-1])
     covering = max(sum(one.s_from <= first for one in shape) - 1, 0)
     known = [one for number, one in enumerate(shape) if number == covering or first < one.s_from < last]
@@ -95,16 +79,7 @@ def given_along(track_id: Optional[int], shape: Sequence[Element], signal: Signa
 
 
 def without(elements: Sequence[PlanElement], number: int, length_m: float) -> Given:
-    """Return the structure of fitted elements of which one is closed by its neighbours.
-
-    Parameters
-    ----------
-    elements : sequence of PlanElement
-    number : int
-        Of the one that goes.
-    length_m : float
-        Length of the measured line.
-    """
+    """Return the structure of fitted elements of which one is closed by its neighbours, on a line of some length."""
     rest = [noted(one) for at, one in enumerate(elements) if at != number]
     return given_of(Alignment(None, LocalFrame(np.zeros(3)), tuple(rest)), 0.0, length_m)
 
@@ -184,18 +159,7 @@ MOST_RISE = 6.6
 def with_round_radii(
     chain: Chain, points: Points, fit: PlanFit, elements: Sequence[PlanElement], progress: Progress = SILENT
 ) -> tuple[PlanElement, ...]:
-    """Return elements with proposed round radii, and how far the track lies off with all of them.
-
-    Parameters
-    ----------
-    chain : Chain
-        That was fitted.
-    points : Points
-    fit : PlanFit
-    elements : sequence of PlanElement
-        With standard errors of their radii.
-    progress : Progress
-    """
+    """Return elements with proposed round radii, and how far the track lies off with all of them."""
     parts = np.flatnonzero(chain.extents[1] > chain.extents[0])
     of_part = [number for number, one in enumerate(elements) if one.type != "clothoid"]
     before = _chi_square(fit, points)

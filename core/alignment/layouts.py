@@ -94,7 +94,7 @@ def _snapped(
     sure = np.minimum(SNAP_SIGMAS * errors.s[1:], SNAP_M)
     far, moves = _moved(chain, ends, np.where(sure > 0, SNAP_M, 0.0))
     far = refitted(far, signal, noise, np.inf)
-    if is_within(far, signal.blocks(noise).near(far), signal.kind.shown_m):
+    if is_within(far, signal.blocks(noise).near(far), signal.kind.shown(noise)):
         return far, moves
     near, moves = _moved(chain, ends, sure)
     return refitted(near, signal, noise, np.inf) if moves.any() else chain, moves
@@ -160,17 +160,7 @@ def _spent(jacobian: sparse.csr_matrix, weight: np.ndarray, covariance: np.ndarr
 
 
 def plan_errors(fit: PlanFit, points: Points, used_m: float, noise: Noise) -> Errors:
-    """Return standard errors of the elements in plan.
-
-    Parameters
-    ----------
-    fit : PlanFit
-    points : Points
-    used_m : float
-        Standard deviation of a single point for which the points were weighted, metres.
-    noise : Noise
-        That they have.
-    """
+    """Return standard errors of the elements in plan, given the one for which points were weighted and their noise."""
     count = len(fit.elements)
     bends = fit.jacobian.shape[1] - 4 * count
     rows = fit.solver.covariance_rows(np.arange(3 * count, 4 * count + bends))
@@ -183,16 +173,7 @@ def plan_errors(fit: PlanFit, points: Points, used_m: float, noise: Noise) -> Er
 
 
 def chain_errors(chain: Chain, signal: Signal, noise: Noise, held: Held = NOTHING) -> Errors:
-    """Return standard errors of the parts of a chain whose joints are jumps.
-
-    Parameters
-    ----------
-    chain : Chain
-    signal : Signal
-    noise : Noise
-    held : Held
-        Bends and starts that were not fitted.
-    """
+    """Return standard errors of the parts of a chain whose joints are jumps; those of what was held are 0."""
     unknowns = Unknowns.of(chain, held)
     weighted = unknowns.matrix(chain, signal.blocks(noise).near(chain))[:, :-1]
     linear, joints = int(unknowns.free.sum()), unknowns.knots[1::2] >= 0
@@ -208,18 +189,7 @@ def chain_errors(chain: Chain, signal: Signal, noise: Noise, held: Held = NOTHIN
 def _spread(
     jacobian: sparse.csr_matrix, s: np.ndarray, weight: np.ndarray, used_m: float, noise: Noise
 ) -> sparse.csr_matrix:
-    """Return the covariance of the weighted sums that a least squares fit solves for, (u, u).
-
-    Parameters
-    ----------
-    jacobian : (n, u) sparse array
-    s, weight : (n,) array
-        Of the points; the weight is their number over the square of `used_m`.
-    used_m : float
-        Standard deviation of a single point for which they were weighted, metres.
-    noise : Noise
-        That they have.
-    """
+    """Return the covariance of the weighted sums that a least squares fit solves for, (u, u); see `plan_errors`."""
     weighted = sparse.diags(weight) @ jacobian
     own = weighted.T @ jacobian * (noise.white_m / used_m) ** 2
     return (own + weighted.T @ (shared_covariance(s, noise) @ weighted)).tocsr()

@@ -38,7 +38,6 @@ class Track:
 
     Attributes
     ----------
-    track_id : int
     xyz : (n, 3) array
         Vertices of the centerline, local metres.
     cant : (k, 2) array
@@ -55,16 +54,7 @@ class Track:
 
 
 def with_stations(track_id: int, xyz: np.ndarray, stations: np.ndarray) -> Track:
-    """Return a track with the cant of its stations, and what these say of bridged gaps.
-
-    Parameters
-    ----------
-    track_id : int
-    xyz : (n, 3) array
-        Vertices, local metres.
-    stations : (k, 3) array
-        Chainage, cant in metres, NaN where it is unknown, and 1 in a bridged gap; in order.
-    """
+    """Return a track with the cant of its stations, (k, 3): chainage, cant in metres or NaN, and 1 in a bridged gap."""
     known = np.isfinite(stations[:, 1]) & (stations[:, 2] == 0)
     bridged = np.zeros(len(xyz), dtype=bool)
     if len(stations):
@@ -73,27 +63,13 @@ def with_stations(track_id: int, xyz: np.ndarray, stations: np.ndarray) -> Track
     return Track(track_id, xyz, stations[known][:, :2], bridged)
 
 
-def moved(track: Track, shift: np.ndarray) -> Track:
-    """Return a track in another frame, to which a shift, (3,) metres, leads."""
-    return replace(track, xyz=track.xyz + shift)
-
-
 def stations_by_track(rows: Iterable[Mapping[str, Any]], fields: Collection[str], name: str) -> dict[int, np.ndarray]:
     """Return chainage, cant and whether a gap is bridged of the stations of each track, (n, 3); NaN without cant.
-
-    Parameters
-    ----------
-    rows : iterable of mappings
-        Of the track geometry; None where a field is empty.
-    fields : collection of str
-        That it has.
-    name : str
-        Of its parameter, for the message.
 
     Raises
     ------
     ParameterError
-        A field is missing.
+        A field is missing in the layer of this name.
     """
     lacking = next((one for one in STATION_NEEDS if one not in fields), None)
     if lacking:
@@ -112,21 +88,12 @@ def stations_by_track(rows: Iterable[Mapping[str, Any]], fields: Collection[str]
 def with_cant(
     lines: Sequence[tuple[int, np.ndarray]], stations: Mapping[int, np.ndarray], quality: str, tracks: str
 ) -> list[Track]:
-    """Return tracks with the cant of their stations.
-
-    Parameters
-    ----------
-    lines : sequence of (int, (n, 3) array)
-        Number and vertices of each track.
-    stations : mapping
-        By track, as `stations_by_track` returns them.
-    quality, tracks : str
-        Names of the parameters, for the message.
+    """Return tracks, given by number and vertices, with the cant of their stations.
 
     Raises
     ------
     ParameterError
-        No track has stations.
+        No track has stations; `quality` and `tracks` are the parameters that the message names.
     """
     if not any(number in stations for number, _ in lines):
         raise ParameterError(f"{quality} has no stations of the tracks in {tracks}: give their track geometry.")
@@ -190,13 +157,7 @@ class Measured:
 
 
 def measured_of(track: Track, limit_m: float, progress: Progress) -> Measured:
-    """Return the points of a track; warn of those that lie off their neighbours by more than a limit.
-
-    Raises
-    ------
-    ParameterError
-        The line cannot have an alignment.
-    """
+    """Return the points of a track; warn of those that lie off their neighbours by more than a limit."""
     _check(track)
     made = _points(track)
     across, up = lateral_signal(made.xyz[:, :2])[1], made.xyz[:, 2]
@@ -254,17 +215,9 @@ SPACING_M = 1.0
 
 
 def groups(xy: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Divide the vertices of a line into groups that are averaged, so that points are `SPACING_M` apart or more.
+    """Divide vertices, (n, 2), into groups that are averaged, so that points are `SPACING_M` apart or more.
 
-    Parameters
-    ----------
-    xy : (n, 2) array
-        Vertices, metres.
-
-    Returns
-    -------
-    starts, counts : (k,) int array
-        First vertex of each group, and its number of vertices. The first and the last vertex are groups of their own.
+    Returns the first vertex and the size of each group, (k,). The first and the last vertex are groups of their own.
     """
     s = Polyline(xy).t
     number = np.floor((s + 0.5 * SPACING_M) / SPACING_M).astype(int)
@@ -274,18 +227,7 @@ def groups(xy: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def lateral_signal(xy: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return distance along a line and the lateral signal y at its points.
-
-    Parameters
-    ----------
-    xy : (n, 2) array
-        Points, metres.
-
-    Returns
-    -------
-    s, y : (n,) array
-        Metres; both start at 0.
-    """
+    """Return distance along a line and the lateral signal y at its points, (n,) metres each, from 0."""
     step = np.diff(xy, axis=0)
     h = np.hypot(*step.T)
     theta = np.unwrap(np.arctan2(step[:, 1], step[:, 0]))
@@ -304,19 +246,9 @@ LONGEST_GAP_M = 2.0
 
 
 def cant_of_rails(line: np.ndarray, rails: Sequence[np.ndarray]) -> np.ndarray:
-    """Return the cant along a line: height of the rail on its left minus that of the rail on its right.
+    """Return distance along a centerline, (n, 3), and cant, (m, 2) metres: height of the left rail minus the right one.
 
-    Parameters
-    ----------
-    line : (n, 3) array
-        Centerline, metres.
-    rails : sequence of (k, 3) arrays
-        Rails of this track and of others.
-
-    Returns
-    -------
-    (m, 2) array
-        Plan distance from the first vertex, and cant, metres.
+    Rails, (k, 3) metres, may be those of other tracks, too.
     """
     places = np.concatenate([Polyline(rail).resampled(STEP_M).xyz for rail in rails]) if rails else np.zeros((0, 3))
     places = places[np.isfinite(places[:, 2])]

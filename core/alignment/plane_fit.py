@@ -84,7 +84,6 @@ class PlanFit:
 
     Attributes
     ----------
-    elements : tuple of PlanElement
     across : (n,) array
         Distance of each point from the curve, positive to the left, metres.
     s : (n,) array
@@ -157,18 +156,7 @@ def fit_plan(
     progress: Progress = SILENT,
     poses: Optional[np.ndarray] = None,
 ) -> PlanFit:
-    """Fit the elements of a chain to points.
-
-    Parameters
-    ----------
-    chain : Chain
-        The structure and first values.
-    points : Points
-    held : Held
-    progress : Progress
-    poses : (e, 3) array, optional
-        First values of places and directions at the starts of the elements; else they are those of the line.
-    """
+    """Fit the elements of a chain, which has the first values, to points; first poses, (e, 3), else are the line's."""
     number = np.where(chain.curved, np.cumsum(chain.curved) - 1, -1)
     bends = chain.bends.copy()
     bends[list(held.bends)] = list(held.bends.values())

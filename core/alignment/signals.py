@@ -56,7 +56,7 @@ class Kind:
     least_m : float
         Least standard deviation of the errors, metres.
     shown_m : float
-        See `Rules`.
+        See `Rules`; where the line was smoothed.
     """
 
     order: int
@@ -65,6 +65,14 @@ class Kind:
     least_m: float = 0.0
     shown_m: float = 0.0
 
+    def shown(self, noise: Noise) -> float:
+        """Return the distance from a curve that no survey shows, metres; 0 where single points scatter."""
+        return self.shown_m if noise.white_m < SMOOTH * self.shown_m else 0.0
+
+
+SMOOTH = 0.2
+"""Share of `Kind.shown_m` below which single points scatter only if the line was smoothed: errors of several lengths
+hang together then, and what the search takes for its noise is less than these."""
 
 LEAST_ERROR_M = 0.001
 """Least standard deviation of a line across and in height, metres: no survey of a track is better. Where single points
@@ -86,7 +94,6 @@ class Signal:
         Distance and value, metres.
     share : (n,) array
         How much each point counts, 1 for a measured one, 0 in a bridged gap.
-    kind : Kind
     """
 
     s: np.ndarray
@@ -105,18 +112,11 @@ class Signal:
 
 
 def noise_of(signal: Signal, tolerance_m: float, progress: Progress = SILENT) -> tuple[Noise, list[Polynomial]]:
-    """Return the noise of a signal, and the partition for it.
+    """Return the noise of a signal, with misalignment up to a tolerance, and the partition for it.
 
     The finer a partition is, the less is left as noise. From the errors of single points upwards, the noise is raised
     until a partition leaves no more than it was made for. Misalignment raises it at every step; where there is none,
     the first partition remains.
-
-    Parameters
-    ----------
-    signal : Signal
-    tolerance_m : float
-        Largest standard deviation of the misalignment.
-    progress : Progress
     """
     used = signal.share > 0
     s, y = signal.s[used], signal.y[used]
@@ -166,24 +166,15 @@ def _residuals(pieces: list[Polynomial], s: np.ndarray, y: np.ndarray) -> list[t
 def find_structure(
     signal: Signal, tolerance_m: float, least_m: float, jumps: bool, progress: Progress = SILENT
 ) -> tuple[Chain, Noise]:
-    """Return the chain that explains a signal, and the noise that is left.
+    """Return the chain that explains a signal, and the noise that is left; see `noise_of`.
 
-    Parameters
-    ----------
-    signal : Signal
-    tolerance_m : float
-        See `noise_of`.
-    least_m : float
-        Least length of a part or a ramp, metres.
-    jumps : bool
-        Whether the bend may jump; where it cannot change linearly, it always may.
-    progress : Progress
+    Parts and ramps have a least length, metres. Where the bend cannot change linearly, it may always jump.
     """
     first, second = progress.divide([1.0, 4.0])
     noise, pieces = noise_of(signal, tolerance_m, first)
     sigma = noise.effective_m(signal.step_m)
     price = max(math.log(len(signal.s) * (noise.white_m / sigma) ** 2), LEAST_PRICE)
-    rules = Rules(signal.kind.ramps, jumps or not signal.kind.ramps, least_m, price, signal.kind.shown_m)
+    rules = Rules(signal.kind.ramps, jumps or not signal.kind.ramps, least_m, price, signal.kind.shown(noise))
     chain = _from_pieces(pieces, signal.kind.order, rules)
     return searched(chain, signal.blocks(noise), rules, second), noise
 
@@ -260,19 +251,9 @@ def partition(
     ends: tuple[float, float],
     progress: Progress = SILENT,
 ) -> list[Polynomial]:
-    """Divide a signal into polynomials.
+    """Divide a signal into polynomials between two ends; its errors have a standard deviation, metres.
 
-    Parameters
-    ----------
-    s, y : (n,) array
-        Distance and signal, metres.
-    sigma : float
-        Standard deviation of the signal's errors, metres.
-    degrees : sequence of int
-        Degrees that a piece may have, each one more than the one before.
-    ends : (float, float)
-        Start of the first and end of the last piece.
-    progress : Progress
+    Each of the degrees that a piece may have is one more than the one before.
     """
     count = max(int(round((ends[1] - ends[0]) / BLOCK_M)), 1)
     bounds = np.linspace(*ends, count + 1)

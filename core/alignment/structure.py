@@ -44,7 +44,6 @@ class Blocks:
 
     Attributes
     ----------
-    fine, coarse : Samples
     first : float
         Distance at which the first block begins, metres.
     noise : Noise
@@ -120,16 +119,7 @@ class Rules:
 
 
 def searched(chain: Chain, blocks: Blocks, rules: Rules, progress: Progress = SILENT) -> Chain:
-    """Improve the structure of a chain until no change in any window lowers the criterion.
-
-    Parameters
-    ----------
-    chain : Chain
-    blocks : Blocks
-        With their noise, so that sums of squared residuals are chi-squares.
-    rules : Rules
-    progress : Progress
-    """
+    """Improve the structure of a chain until no change in any window lowers the criterion; blocks have their noise."""
     waiting = deque(range(len(chain.bends)))
     accepted: set[tuple] = set()
     done = 0

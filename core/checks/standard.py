@@ -22,10 +22,10 @@ from ..heads.sections import likelier_width
 from ..parameters import Parameters
 from ..progress import SILENT, Progress
 from ..rails import HEAD_OFF_M, HeadWidths, RailLine, SearchFigures
-from ..squares.density import fullest_square
-from ..squares.grid import PointSource
 from ..standards import HEAD_WIDTH_RANGE_MM, SAME_GAUGE_M, STANDARDS, Gauge, RailStandard, closest_standard, of_gauge
+from ..tiles.grid import PointSource
 from ..tracks.parallels import width_at
+from .density import fullest_square
 from .gauge_estimate import Spacings, measure_spacings
 
 SAMPLE_M = 50.0

@@ -214,6 +214,12 @@ def is_geographic(crs: pyproj.CRS) -> bool:
     return _plane(crs).is_geographic
 
 
+def unit_in_plan(crs_wkt: str | None) -> float:
+    """Return the length in metres of the unit in plan; that of degrees, or of an unknown system, counts as 1."""
+    crs = parse_crs(crs_wkt) if crs_wkt else None
+    return 1.0 if crs is None or is_geographic(crs) else units(crs)[0]
+
+
 def _plane(crs: pyproj.CRS) -> pyproj.CRS:
     """Return the horizontal part of a system."""
     return _unbound((_unbound(crs).sub_crs_list or [crs])[0])

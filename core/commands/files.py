@@ -34,6 +34,7 @@ from .options import vector_module
 if TYPE_CHECKING:
     from ..airborne.survey import Guide
     from ..jobs.lines import Lines
+    from ..jobs.places import Places
     from ..jobs.result import Rasters
     from ..kilometres.axes import PlacedAxes
     from .vectors import Features
@@ -125,7 +126,11 @@ class FileValues(Values):
 
     def axes(self, crs_wkt: str | None) -> PlacedAxes:
         """Read AXIS and what states its kilometres, in a coordinate system."""
-        return vector_module("AXIS", "kilometres").read_axes(self, None, crs_wkt)[0]
+        return vector_module("AXIS", "kilometres").read_axes(self, crs_wkt)
+
+    def places(self, name: str, plane: str | None, progress: Progress) -> Places:
+        """Read the features of a layer of any kind, in the plane of the axes."""
+        return vector_module(name, "kilometres").places_of(self.features(name), plane)
 
     @property
     def keeps(self) -> bool:

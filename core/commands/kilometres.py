@@ -2,27 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pyogrio
 import shapely
 
-from ..clouds.crs import is_geographic, parse_crs, units
+from ..clouds.crs import is_geographic, parse_crs, unit_in_plan
 from ..design_places import are_places
-from ..disk import Destination
 from ..errors import CrsError, MissingError, ParameterError
-from ..fields import EXTENT_FIELDS, STATION_FIELDS, Field
 from ..files.geopackage import geometries_in
-from ..files.writing import column_of, write_table
+from ..jobs.places import FAR, NOWHERE, Places, without_places
 from ..jobs.shared import DECREASING
 from ..kilometres.axes import (
     AXIS_IN_DEGREES,
     NAME_FIELDS,
-    Axes,
     AxisLine,
     PlacedAxes,
     Post,
@@ -33,12 +29,8 @@ from ..kilometres.axes import (
     post_field,
 )
 from ..kilometres.stationing import Jump
-from ..progress import Progress
-from ..rails import Kilometres
-from .vectors import LAYER, Features, explained, read_features
-
-FAR = np.full(2, np.inf)
-"""Place of a feature that is not on the map."""
+from .files import FileValues
+from .vectors import LAYER, Features, explained
 
 
 def _with_measures(features: Features, file: str) -> Features:
@@ -50,77 +42,61 @@ def _with_measures(features: Features, file: str) -> Features:
     return replace(features, shapes=shapely.from_wkb([stored.get(int(number)) for number in features.ids]))
 
 
-def read_axes(given: Mapping[str, Any], places: str | None, plane: str | None = None) -> tuple[PlacedAxes, str | None]:
-    """Read the axes that values state; also return the coordinate system of their plane.
+def read_axes(values: FileValues, plane: str | None) -> PlacedAxes:
+    """Read the axes that values state.
 
     Parameters
     ----------
-    given : mapping
+    values : FileValues
         With AXIS and what goes with it.
-    places : str or None
-        Coordinate system of what is to be located.
-    plane : str, optional
-        Coordinate system of the plane; else it is that of the axis, or of the places if the axis is in degrees.
+    plane : str or None
+        Coordinate system in which kilometres are measured; else it is that of the axis.
 
     Raises
     ------
     CrsError, ParameterError, RailExtractError
         A file lacks what it should state, or they contradict each other.
     """
-    features = _with_measures(read_features(given["AXIS"], "AXIS"), given["AXIS"])
-    stated_systems = [one for one in (plane, features.crs_wkt, places) if one]
-    crs_wkt = next((one for one in stated_systems if not is_geographic(parse_crs(one))), None)
-    if crs_wkt is None and stated_systems:
+    features = _with_measures(values.features("AXIS"), values["AXIS"])
+    crs_wkt = plane or features.crs_wkt
+    if crs_wkt and is_geographic(parse_crs(crs_wkt)):
         raise CrsError(AXIS_IN_DEGREES)
-    unit_m = units(parse_crs(crs_wkt))[0] if crs_wkt else 1.0
+    unit_m = unit_in_plan(crs_wkt)
     lines = list(_axis_lines(features, crs_wkt, unit_m))
     if not lines:
         raise MissingError("AXIS", "line")
-    start_km, posts_file, jumps = (given[name] for name in ("START_KM", "POSTS", "JUMPS"))
-    start = None if start_km is None else Start(start_km, given["DIRECTION"] == DECREASING)
-    posts = _posts(read_features(posts_file, "POSTS"), given["POST_FIELD"], crs_wkt, unit_m) if posts_file else []
-    made = make_axes(lines, start, posts, _jumps(read_features(jumps, "JUMPS")) if jumps else [])
-    return PlacedAxes(Axes(made.axes, made.notices), unit_m, given["FORMAT"]), crs_wkt
+    start_km = values["START_KM"]
+    start = None if start_km is None else Start(start_km, values["DIRECTION"] == DECREASING)
+    filled = values.filled
+    posts = _posts(values.features("POSTS"), values["POST_FIELD"], crs_wkt, unit_m) if filled("POSTS") else []
+    jumps = _jumps(values.features("JUMPS")) if filled("JUMPS") else []
+    return PlacedAxes(make_axes(lines, start, posts, jumps), unit_m, values["FORMAT"])
 
 
-def located(
-    features: Features, axes: PlacedAxes, crs_wkt: str | None, progress: Progress
-) -> tuple[tuple[Field, ...], list[Any]]:
-    """Find the kilometres of features; return their fields, and the values of each.
+def places_of(features: Features, plane: str | None) -> Places:
+    """Return where features count in the plane of axes.
 
-    Parameters
-    ----------
-    features : Features
-    axes : PlacedAxes
-    crs_wkt : str or None
-        Of the plane of the axes.
-    progress : Progress
+    Raises
+    ------
+    RailExtractError
+        None has a geometry.
     """
-    shapes = features.in_plane(crs_wkt)
-    bounds = shapely.bounds(shapes)
-    far = ~are_places(bounds, axes.unit_m) & ~np.array(
-        [shape is None or shape.is_empty for shape in shapes], dtype=bool
-    )
+    shapes, count = features.in_plane(plane), len(features.ids)
+    empty = np.array([shape is None or shape.is_empty for shape in shapes], dtype=bool)
+    if count and empty.all():
+        raise without_places(features.option)
+    lost = ~are_places(shapely.bounds(shapes), unit_in_plan(plane)) & ~empty
     with explained(features.option):
-        places = np.array([FAR if lost else _place(shape) for shape, lost in zip(shapes, far)]).reshape(-1, 2)
-    known = axes.on_map(places, features.ids.tolist(), progress)
-    kilometres = Kilometres.empty(len(shapes))
-    kilometres.put(known, axes.locate(places[known], progress))
-    columns = [getattr(kilometres, field.name) for field in STATION_FIELDS]
-    if all(shape is None or "Point" in shape.geom_type for shape in shapes):
-        return STATION_FIELDS, columns
-    xy, numbers = shapely.get_coordinates(shapes, return_index=True)
-    xy, numbers = xy[known[numbers]], numbers[known[numbers]]
-    extents, km = np.full((len(shapes), 2), np.nan), axes.kilometres(xy, progress).km
-    np.fmin.at(extents[:, 0], numbers, km)
-    np.fmax.at(extents[:, 1], numbers, km)
-    return (*STATION_FIELDS, *EXTENT_FIELDS), [*columns, *extents.T]
+        xy = np.array([FAR if far else _place(shape) for shape, far in zip(shapes, lost)]).reshape(-1, 2)
+    vertices, owner = shapely.get_coordinates(shapes, return_index=True)
+    are_points = all(shape is None or "Point" in shape.geom_type for shape in shapes)
+    return Places(features.ids.tolist(), xy, vertices, owner, are_points, features)
 
 
 def _place(shape: shapely.Geometry | None) -> np.ndarray:
     """Return where a feature counts, (2,): half way along a line, inside a polygon, in the mean of points."""
     if shape is None or shape.is_empty:
-        return np.full(2, np.nan)
+        return NOWHERE
     if "Line" in shape.geom_type:
         shape = shapely.line_interpolate_point(shapely.line_merge(shape), 0.5, normalized=True)
     elif "Polygon" in shape.geom_type:
@@ -161,28 +137,3 @@ def _jumps(features: Features) -> list[Jump]:
         Jump(*(km_of(row[name], name, "JUMPS", int(feature)) for name in ("km_back", "km_ahead")))
         for feature, row in zip(features.ids, features.rows())
     ]
-
-
-def write_copy(
-    destination: Destination, source: Features, fields: Sequence[Field], columns: Sequence[Sequence[Any]]
-) -> None:
-    """Write the features of a layer with further fields into a GeoPackage.
-
-    Parameters
-    ----------
-    destination : Destination
-    source : Features
-    fields : sequence of Field
-    columns : sequence of sequence
-        Values of each further field, one per feature.
-    """
-    own = {field.name for field in fields}
-    written: dict[str, tuple[np.ndarray, np.ndarray | None]] = {
-        name: (values, None) for name, values in source.columns.items() if name not in own
-    }
-    for field, values in zip(fields, columns):
-        written[field.name] = column_of(field, [field.value(value) for value in values])
-    kinds = {shape.geom_type for shape in source.shapes if shape is not None}
-    shapes = np.array([shapely.to_wkb(shape, output_dimension=4) for shape in source.shapes], dtype=object)
-    with destination.replacing() as new:
-        write_table(new, "stations", shapes, kinds.pop() if len(kinds) == 1 else "Unknown", written, source.crs_wkt)

@@ -14,7 +14,7 @@ import pyogrio
 import shapely
 
 from ..airborne.survey import Guide, gauge_of
-from ..clouds.crs import import_pyproj, is_geographic, parse_crs, units
+from ..clouds.crs import import_pyproj, parse_crs, unit_in_plan
 from ..clouds.mask import Mask
 from ..design_places import check_line, check_places
 from ..errors import ParameterError
@@ -84,7 +84,7 @@ class Features:
         ------
         DesignNumberError
         """
-        unit_m = _unit_m(self.crs_wkt)
+        unit_m = unit_in_plan(self.crs_wkt)
         for feature, bounds in zip(self.ids, shapely.bounds(self.shapes).reshape(-1, 2, 2)):
             if not np.isnan(bounds).all():
                 check_places(bounds, f"{self.option} (feature {feature})", unit_m)
@@ -100,13 +100,7 @@ class Features:
         """
         for number, line in self.checked().parts(crs_wkt, "LineString"):
             where = f"{self.option} (feature {self.ids[number]})"
-            yield number, check_line(shapely.get_coordinates(line), where, _unit_m(crs_wkt or self.crs_wkt))
-
-
-def _unit_m(crs_wkt: str | None) -> float:
-    """Return the unit of a coordinate system in plan; that of degrees counts as 1."""
-    crs = parse_crs(crs_wkt) if crs_wkt else None
-    return 1.0 if crs is None or is_geographic(crs) else units(crs)[0]
+            yield number, check_line(shapely.get_coordinates(line), where, unit_in_plan(crs_wkt or self.crs_wkt))
 
 
 def read_features(file: str | Path, option: str = "", columns: Sequence[str] | None = None) -> Features:

@@ -38,7 +38,6 @@ class Delivery:
         Name of the system of heights; empty if it is unknown.
     version : str
         Of this program.
-    made : datetime
     """
 
     gauge_m: float
@@ -104,15 +103,7 @@ Bent = TypeVar("Bent", VerticalElement, CantElement)
 def within_plan(alignment: Alignment, where: str, progress: Progress, start_m: float = 0.0) -> Alignment:
     """Return an alignment of which profile and cant end with its plan, after a check of all its numbers.
 
-    Parameters
-    ----------
-    alignment : Alignment
-    where : str
-        Names it in messages.
-    progress : Progress
-        Takes a warning where profile or cant and the plan do not cover each other.
-    start_m : float
-        Station of `s` = 0, which the warning counts from.
+    The user is told where profile or cant and the plan do not cover each other, by stations from `start_m` at `s` = 0.
 
     Raises
     ------

@@ -30,12 +30,7 @@ LEFT_OUT = {
 
 
 def check_format(path: Path) -> None:
-    """Check that the name of a file states a format.
-
-    Raises
-    ------
-    ParameterError
-    """
+    """Check that the name of a file states a format."""
     if path.suffix.lower() not in FORMATS:
         raise ParameterError(f"OUTPUT can't be {path.name}: let it end in .xml for LandXML, in .ifc or in .dxf.")
 
@@ -70,18 +65,7 @@ def write_designs(
     version: str,
     progress: Progress = SILENT,
 ) -> None:
-    """Write alignments in the format that the name of a file states.
-
-    Parameters
-    ----------
-    alignments : sequence of Alignment
-    standard : RailStandard
-        Gauge and railhead width give the distance across which cant is measured.
-    circles : bool
-        Whether curves of the profile are circles in LandXML; else they are parabolas.
-    version : str
-        Of this program.
-    """
+    """Write alignments in the format that the name of a file states; see `Delivery` and `write_landxml`."""
     kind = FORMATS[path.suffix.lower()]
     wkt = alignments[0].frame.crs_wkt
     epsg, system, heights = codes_and_names(parse_crs(wkt)) if wkt else (None, "", "")
@@ -105,21 +89,7 @@ def left_out(path: Path, alignments: Sequence[Alignment]) -> str:
 
 
 def check_place(name: str, frame: LocalFrame, east_first: bool, progress: Progress) -> None:
-    """Refuse easting and northing that are exchanged, as the area of the coordinate system shows; warn of other places.
-
-    Parameters
-    ----------
-    name : str
-        Of the file.
-    frame : LocalFrame
-        Of its alignments, with the coordinate system.
-    east_first : bool
-        Whether the points were read as easting and northing.
-
-    Raises
-    ------
-    AlignmentFileError
-    """
+    """Refuse easting and northing that are exchanged, as the area of the system shows; warn of other places."""
     if frame.crs_wkt is None:
         progress.warning(f"{name} has no coordinate system: choose CRS to see its tracks in their place.")
         return

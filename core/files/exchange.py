@@ -82,26 +82,7 @@ class Shape:
 def write_shapes(
     path: Path, shapes: Iterable[Shape], fields: Sequence[Field], frame: LocalFrame, kind: str, is_line: bool
 ) -> None:
-    """Write shapes in the format that the name of the file states.
-
-    Parameters
-    ----------
-    path : Path
-        Ends in .dxf or .csv.
-    shapes : iterable of Shape
-    fields : sequence of Field
-    frame : LocalFrame
-        Of the coordinates.
-    kind : str
-        First word of the layers of a DXF file, such as RAILS.
-    is_line : bool
-        Whether the shapes are lines.
-
-    Raises
-    ------
-    OSError
-        The file cannot be written.
-    """
+    """Write shapes, lines or points, into a .dxf or a .csv file; `kind` begins the names of layers of a drawing."""
     if path.suffix.lower() == ".dxf":
         with path.open("w", encoding="ascii", errors="replace", newline="\r\n") as file:
             _write_dxf(file, list(shapes), fields, kind, is_line)
@@ -150,11 +131,6 @@ def write_alignments(path: Path, alignments: Sequence[Alignment], progress: Prog
     """Write alignments as a DXF file: a 3D polyline for each, and a point with a text where an element begins.
 
     The curve of track 7 is on the layer ALIGNMENT_7, the elements are on PLAN_7, PROFILE_7 and CANT_7.
-
-    Raises
-    ------
-    OSError
-        The file cannot be written.
     """
     entities: list[Entity] = []
     for alignment in alignments:

@@ -24,13 +24,7 @@ def tables_in(path: Path) -> set[str]:
 
 
 def geometries_in(path: Path, table: str) -> dict[int, bytes]:
-    """Return the geometries of a table as well-known binary by the number of their feature, with M values.
-
-    Raises
-    ------
-    sqlite3.Error
-        There is no such table.
-    """
+    """Return the geometries of a table as well-known binary by the number of their feature, with M values."""
     with _opened(path) as database:
         column = "SELECT column_name FROM gpkg_geometry_columns WHERE table_name = ?"
         ((name,),) = database.execute(column, (table,))

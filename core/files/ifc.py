@@ -30,21 +30,7 @@ PRECISION_M = 1e-5
 
 
 def write_ifc(path: Path, alignments: Sequence[Alignment], delivery: Delivery, progress: Progress = SILENT) -> None:
-    """Write alignments whose coordinates are in metres.
-
-    Parameters
-    ----------
-    path : Path
-    alignments : sequence of Alignment
-        At least one; all in the same frame.
-    delivery : Delivery
-    progress : Progress
-
-    Raises
-    ------
-    OSError
-        The file cannot be written.
-    """
+    """Write alignments of one frame, with coordinates in metres; there is at least one."""
     model = _Model(alignments[0].frame.origin, delivery, progress)
     alone = [model.add(name, alignment) for name, alignment in zip(names(alignments), alignments)]
     model.relate("IfcRelAggregates", model.project, [*alone], "alignments")
@@ -203,13 +189,7 @@ class Segment:
 
 
 def plan_segments(file: StepFile, alignment: Alignment) -> list[Segment]:
-    """Add the elements in plan.
-
-    Parameters
-    ----------
-    file : StepFile
-    alignment : Alignment
-    """
+    """Add the elements in plan."""
     bends = [(one.k_from, one.k_to) for one in alignment.plan]
     made = [_plan_segment(file, one, how) for one, how in zip(alignment.plan, _transitions(bends))]
     end = np.array([alignment.s_to])
@@ -241,15 +221,7 @@ def _plan_segment(file: StepFile, one: PlanElement, transition: Enum) -> Segment
 
 
 def vertical_segments(file: StepFile, alignment: Alignment, z_of_origin: float) -> list[Segment]:
-    """Add the grades and parabolas; see `plan_segments`.
-
-    Parameters
-    ----------
-    file, alignment
-        See `plan_segments`.
-    z_of_origin : float
-        Height of the zero of local heights.
-    """
+    """Add the grades and parabolas, given the height of the zero of local heights."""
     bends = [2 * (one.curvature,) for one in alignment.vertical]
     made = [
         _vertical_segment(file, alignment, one, z_of_origin, how)
@@ -284,15 +256,7 @@ def _slope_length(one: VerticalElement) -> float:
 
 
 def cant_segments(file: StepFile, alignment: Alignment, distance_m: float) -> list[Segment]:
-    """Add constant cant and ramps; see `plan_segments`.
-
-    Parameters
-    ----------
-    file, alignment
-        See `plan_segments`.
-    distance_m : float
-        Between the middles of the heads.
-    """
+    """Add constant cant and ramps, given the distance between the middles of the heads."""
     last = alignment.cant[-1]
     after = CantElement(last.s_to, 0.0, last.cant_to_m, last.cant_to_m)
     ways = [SMOOTH] * len(alignment.cant) + [BROKEN]
@@ -342,15 +306,7 @@ def line(file: StepFile) -> Ref:
 
 
 def placement_2d(file: StepFile, place: Ref, heading: float) -> Ref:
-    """Add a placement in a plane.
-
-    Parameters
-    ----------
-    file : StepFile
-    place : Ref
-    heading : float
-        Direction of its x axis, radians.
-    """
+    """Add a placement in a plane, of which the x axis has a direction, radians."""
     direction = file.add("IfcDirection", (math.cos(heading), math.sin(heading)))
     return file.add("IfcAxis2Placement2D", place, direction)
 

@@ -39,9 +39,6 @@ MIN_BREAK = 1e-6
 """Smallest break of the gradient, metres per metre, that becomes a point of its own: the element table is rounded to a
 hundredth of it."""
 
-MM = 1000.0
-"""Millimetres per metre."""
-
 
 def write_landxml(
     path: Path,
@@ -52,19 +49,7 @@ def write_landxml(
 ) -> None:
     """Write alignments whose coordinates are in metres.
 
-    Parameters
-    ----------
-    path : Path
-    alignments : sequence of Alignment
-    delivery : Delivery
-    circles : bool
-        Whether curves of the profile are written as circles, as railways do, or as parabolas, as roads do.
-    progress : Progress
-
-    Raises
-    ------
-    OSError
-        The file cannot be written.
+    Curves of the profile are written as circles, as railways do, or as parabolas, as roads do.
     """
     made = delivery.made.replace(microsecond=0)
     facts = {"date": made.date().isoformat(), "time": made.time().isoformat(), "version": "1.2", "language": "English"}
@@ -184,7 +169,7 @@ def _write_cant(
             "CantStation",
             {
                 "station": _written(s + internal),
-                "appliedCant": _written(MM * outer_m + 0.0),
+                "appliedCant": _written(1000.0 * outer_m + 0.0),
                 "transitionType": "clothoid",
                 "curvature": "cw" if cw else "ccw",
                 **adverse,

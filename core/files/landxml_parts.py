@@ -38,9 +38,6 @@ STRAIGHT = ("inf", "infinity")
 
 TURNS = {"ccw": 1.0, "cw": -1.0}
 
-MM = 1000.0
-"""Millimetres per metre."""
-
 
 @dataclass(frozen=True)
 class Part:
@@ -52,7 +49,6 @@ class Part:
         Names it in messages.
     start, end : (2,) array
         Coordinates in the order of the file.
-    length_m : float
     k_from, k_to : float
         Curvatures in 1/m, positive to the left.
     seen : float
@@ -74,20 +70,7 @@ class Part:
 
 
 def parts_of(node: ET.Element, name: str, progress: Progress) -> list[Part]:
-    """Return the plan elements of an alignment.
-
-    Parameters
-    ----------
-    node : Element
-        The alignment.
-    name : str
-        Its name in messages.
-    progress : Progress
-
-    Raises
-    ------
-    AlignmentFileError
-    """
+    """Return the plan elements of the node of an alignment, which messages call `name`."""
     readers = {"Line": _line, "Curve": _curve, "Spiral": _spiral}
     found = []
     for number, child in enumerate((one for one in node.iterfind("CoordGeom/*") if one.tag != "Feature"), start=1):
@@ -107,16 +90,7 @@ def parts_of(node: ET.Element, name: str, progress: Progress) -> list[Part]:
 
 
 def placed(parts: Sequence[Part], frame: LocalFrame, east_first: bool, progress: Progress) -> tuple[PlanElement, ...]:
-    """Return plan elements in local metres, from `s` = 0.
-
-    Parameters
-    ----------
-    parts : sequence of Part
-    frame : LocalFrame
-    east_first : bool
-        Whether points are written easting first.
-    progress : Progress
-        Takes a warning of gaps.
+    """Return plan elements in local metres, from `s` = 0; warn of gaps.
 
     Raises
     ------
@@ -210,20 +184,7 @@ def _side(start: np.ndarray, end: np.ndarray, place: np.ndarray) -> float:
 def profile_of(node: ET.Element, name: str, progress: Progress) -> tuple[VerticalElement, ...]:
     """Return grades and parabolas of the first profile of an alignment; none if it has no profile.
 
-    A circle becomes the parabola of the same tangents.
-
-    Parameters
-    ----------
-    node : Element
-        The alignment.
-    name : str
-        Its name in messages.
-    progress : Progress
-        Takes a warning of further profiles.
-
-    Raises
-    ------
-    AlignmentFileError
+    A circle becomes the parabola of the same tangents. See `parts_of`.
     """
     profiles = [one for one in node.iterfind("Profile/ProfAlign") if len(one)]
     if len(profiles) > 1:
@@ -285,17 +246,7 @@ def _curve_length(node: ET.Element, before: float, after: float, name: str) -> f
 
 
 def cant_of(node: ET.Element, name: str, progress: Progress) -> tuple[CantElement, ...]:
-    """Return constant cant and ramps of an alignment; none if it has no cant.
-
-    Parameters
-    ----------
-    node, name, progress
-        See `profile_of`.
-
-    Raises
-    ------
-    AlignmentFileError
-    """
+    """Return constant cant and ramps of an alignment; none if it has no cant. See `parts_of`."""
     cant = node.find("Cant")
     if cant is None:
         return ()
@@ -324,7 +275,7 @@ def _signed_cant_m(node: ET.Element, where: str) -> float:
     outer_mm = _needed(node, "appliedCant", where, CANT_MM)
     if node.get("adverse") in ("true", "1"):
         outer_mm = -abs(outer_mm)
-    return -_turn(node, where, "curvature") * outer_mm / MM + 0.0
+    return -_turn(node, where, "curvature") * outer_mm / 1000.0 + 0.0
 
 
 def stations_of_file(node: ET.Element, name: str) -> Stations:

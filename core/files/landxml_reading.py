@@ -42,21 +42,10 @@ HEADS = {
 
 
 def read_landxml(path: Path, east_first: bool = False, progress: Progress = SILENT) -> tuple[Alignment, ...]:
-    """Read the alignments of a LandXML file.
+    """Read the alignments of a LandXML file, of which points may be written easting first, against the format.
 
-    Parameters
-    ----------
-    path : Path
-    east_first : bool
-        Whether points are written easting first, against the format.
-    progress : Progress
-        Takes warnings.
-
-    Returns
-    -------
-    tuple of Alignment
-        In local metres of one frame without a coordinate system. Tracks are numbered in the order of the file; `s`
-        starts at 0.
+    They are in local metres of one frame without a coordinate system. Tracks are numbered in the order of the file; `s`
+    starts at 0.
 
     Raises
     ------
@@ -168,15 +157,6 @@ MAX_DEPTH = 100
 
 def branches(path: Path, root: str, names: Collection[str], progress: Progress = SILENT) -> Iterator[ET.Element]:
     """Yield the children of the root with the given names, in the order of the file, whole; others are passed over.
-
-    Parameters
-    ----------
-    path : Path
-    root : str
-        Name of the root.
-    names : collection of str
-        Names, without a namespace.
-    progress : Progress
 
     Raises
     ------

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Union
+from itertools import chain, count
+from typing import TYPE_CHECKING, Any, ClassVar, Union
 
 import numpy as np
 
 from ..alignment.elements import Alignment
 from ..alignment.stations import measured
+from ..checks.listing import Finding, list_findings
 from ..fields import (
     AXES,
     CENTERLINES,
@@ -18,17 +20,18 @@ from ..fields import (
     FINDINGS,
     LOCATED_FINDINGS,
     LOCATED_QUALITY,
+    PLACES,
     QUALITY,
     RAILS,
     STATION_FIELDS,
     STATIONS,
     STOPS,
+    Field,
     Product,
 )
 from ..frame import LocalFrame
 from ..progress import SILENT, Progress
 from ..rails import Centerline, RailLine, RailNetwork, TrackGeometry
-from ..report import Finding, list_findings
 from .table import rows
 
 if TYPE_CHECKING:
@@ -56,6 +59,11 @@ class Layer:
     xyz: Sequence[np.ndarray]
 
     @property
+    def fields(self) -> tuple[Field, ...]:
+        """Fields of the columns."""
+        return self.product.fields
+
+    @property
     def is_flat(self) -> bool:
         """Whether there are features, and none has heights."""
         return len(self.xyz) > 0 and all(np.isnan(one[..., 2]).any() for one in self.xyz)
@@ -77,16 +85,48 @@ class Layer:
         return iter(frame.to_crs(np.reshape(self.xyz, (-1, 3)))[:, own])
 
 
-def network_makers(network: RailNetwork, gauges_m: Sequence[float]) -> dict[str, Callable[[], Layer]]:
-    """Return the functions that make the layers of an extraction, by their names.
+@dataclass(frozen=True)
+class Copy:
+    """A layer of the user with further fields.
 
-    Parameters
+    Attributes
     ----------
-    network : RailNetwork
-        With the geometry of its tracks, for "quality" and "findings".
-    gauges_m : sequence of float
-        Gauges of the extraction.
+    originals : object
+        Its features, as the front end has read them.
+    columns : sequence of sequence
+        Values of each further field, one per feature.
     """
+
+    product: ClassVar[Product] = PLACES
+    originals: Any
+    fields: tuple[Field, ...]
+    columns: Sequence[Sequence[Any]]
+
+    def written_columns(self) -> list[list[Any]]:
+        """Return the further columns with the values as they are written; None where one is unknown."""
+        return [[field.value(value) for value in values] for field, values in zip(self.fields, self.columns)]
+
+
+AnyLayer = Union[Layer, Copy]
+
+
+def written_by_name(layer: AnyLayer) -> dict[str, Sequence[Any]]:
+    """Return the values of the fields as they are written; a further one of a copy whose name is taken gets a number.
+
+    >>> from types import SimpleNamespace as Originals
+    >>> km = Field("km", float, "", 3)
+    >>> list(written_by_name(Copy(Originals(columns={"km": [7.0]}), (km,), [[12.1]])))
+    ['km', 'km_2']
+    """
+    found = dict(layer.originals.columns) if isinstance(layer, Copy) else {}
+    for one, values in zip(layer.fields, layer.written_columns()):
+        names = chain([one.name], (f"{one.name}_{number}" for number in count(2)))
+        found[next(name for name in names if name not in found)] = values
+    return found
+
+
+def network_makers(network: RailNetwork, gauges_m: Sequence[float]) -> dict[str, Callable[[], Layer]]:
+    """Return the functions that make the layers of an extraction by name; quality needs the geometry of tracks."""
     return {
         "rails": lambda: lines_layer(RAILS, network.rails),
         "centerlines": lambda: lines_layer(CENTERLINES, network.centerlines),

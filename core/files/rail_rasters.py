@@ -50,12 +50,10 @@ class RasterFile(ABC):
     ----------
     transform : tuple of float
         As in GDAL: x, cell width, skew, y, skew, negative cell height.
-    crs_wkt : str or None
     shape : tuple of int
         Height and width, in cells.
     bands : tuple of str
         Description of each band.
-    tags : mapping of str to str
     """
 
     transform: tuple[float, ...]
@@ -79,7 +77,6 @@ class RasterSource:
 
     Attributes
     ----------
-    path : Path
     open : callable
         Returns a context with the open file; it raises an `OSError` if this is not a raster.
     """

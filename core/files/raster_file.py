@@ -141,18 +141,7 @@ def header_for(
 ) -> RasterHeader:
     """Lay out a file for rasters of one grid, with a margin of a tile in which the network can close gaps.
 
-    Parameters
-    ----------
-    rasters : sequence of RailRaster
-        On one grid; at least one has a rail cell.
-    class_codes : sequence of int
-        Class of each raster.
-    frame : LocalFrame
-        Its origin is the corner of cell (0, 0).
-    extent : tuple of float, optional
-        Extent to which the points were restricted.
-    model : str
-        The parameter MODEL of the run.
+    One of them, at least, has a rail cell. The frame has its origin in the corner of cell (0, 0).
 
     Raises
     ------
@@ -188,20 +177,7 @@ def on_one_grid(rasters: Sequence[RailRaster], frame: LocalFrame) -> tuple[list[
 
 
 def write_rasters(path: Path, header: RasterHeader, rasters: Sequence[RailRaster]) -> None:
-    """Write rasters of one grid without QGIS, one band each; empty blocks take no space.
-
-    Parameters
-    ----------
-    path : Path
-        New file.
-    rasters : sequence of RailRaster
-        On the grid of the header.
-
-    Raises
-    ------
-    OSError
-        The file can't be written.
-    """
+    """Write rasters of one grid into a new file without QGIS, one band each; empty blocks take no space."""
     import rasterio
 
     _, _, height, width = header.window

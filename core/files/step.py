@@ -58,31 +58,14 @@ class StepFile:
         self._progress = progress
 
     def add(self, entity: str, *attributes: Any) -> Ref:
-        """Add an instance.
-
-        Parameters
-        ----------
-        entity : str
-            Name of its type, such as IfcProject.
-        *attributes : object
-            None, bool, number, str, `Whole`, `Ref`, `Enum`, `Measure`, or a sequence of these.
-        """
+        """Add an instance of a type such as IfcProject; see `written` for the attributes."""
         self._progress.check()
         number = len(self._lines) + 1
         self._lines.append(f"#{number}={entity.upper()}({','.join(map(written, attributes))});\n")
         return Ref(number)
 
     def text(self, schema: str, view: str, name: str, program: str, made: datetime) -> str:
-        """Return the text of the file.
-
-        Parameters
-        ----------
-        schema, view : str
-            Such as IFC4X3_ADD2, and the model view.
-        name, program : str
-            Of the file, and of the program that writes it.
-        made : datetime
-        """
+        """Return the text of the file, given schema, model view, its name, the program that writes it, and the time."""
         stamp = written(made.replace(microsecond=0).isoformat())
         head = (
             f"FILE_DESCRIPTION(({written(f'ViewDefinition [{view}]')}),'2;1');\n"

@@ -45,13 +45,7 @@ KEY_FIELDS = ("layout", "s_from", "s_to")
 
 
 def check_table(names: Collection[str], source: str) -> None:
-    """Check that a table with these fields is an element table; `source` names it in the message.
-
-    Raises
-    ------
-    RailExtractError
-        It is another one.
-    """
+    """Check that a table with these fields is an element table; `source` names it in the message."""
     if not set(KEY_FIELDS) <= set(names):
         raise RailExtractError(
             f"{source} is not an element table, because it lacks the fields {', '.join(KEY_FIELDS)}: give the output "
@@ -61,13 +55,6 @@ def check_table(names: Collection[str], source: str) -> None:
 
 def read_table(table: Iterable[Row], source: str) -> list[Row]:
     """Return the rows of an element table with numbers for numbers that are written as text, after a check of all.
-
-    Parameters
-    ----------
-    table : iterable of mappings
-        Rows by the name of the field, with any values.
-    source : str
-        Name of the table, for messages.
 
     Raises
     ------
@@ -94,22 +81,7 @@ def _read(row: Row, name: str, kind: type, where: str) -> Any:
 
 
 def frame_of(table: Iterable[Row], system: tuple[Optional[str], float, float], source: str) -> LocalFrame:
-    """Return the local frame of an element table.
-
-    Parameters
-    ----------
-    table : iterable of mappings
-        From `read_table`.
-    system : (str or None, float, float)
-        Coordinate system as WKT, and its units in plan and in height, metres.
-    source : str
-        Name of the table, for the message.
-
-    Raises
-    ------
-    RailExtractError
-        No element has a place.
-    """
+    """Return the local frame of rows of `read_table`, given a coordinate system and its units in plan and height."""
     starts = [(row["x"], row["y"]) for row in table if None not in (row["x"], row["y"])]
     if not starts:
         raise RailExtractError(f"{source} has no element in plan with x and y: give a table with layout H.")
@@ -132,16 +104,10 @@ def rows(alignment: Alignment, progress: Progress = SILENT) -> list[dict[str, An
 
 
 def alignments(table: Iterable[Row], frame: LocalFrame, progress: Progress = SILENT) -> list[Alignment]:
-    """Return the alignments of an element table, in order of their track.
+    """Return the alignments of rows of `read_table`, in any order, in order of their track.
 
-    Parameters
-    ----------
-    table : iterable of mappings
-        From `read_table`, in any order; see `core.fields.ELEMENT_FIELDS`. Start, end, place and direction of the start,
-        type and radii are read in plan; height and gradients, or cant, in the other layouts.
-    frame : LocalFrame
-        Of the places in the alignments.
-    progress : Progress
+    Start, end, place and direction of the start, type and radii are read in plan; height and gradients, or cant, in the
+    other layouts.
 
     Raises
     ------

@@ -115,8 +115,8 @@ def _run(values: Values, progress: Progress) -> Result:
 
 def _result(values: Values, network: RailNetwork, origin: Origin) -> Result:
     """Return what was extracted as a result."""
+    from ..checks.listing import summary
     from ..files.layers import network_makers
-    from ..report import summary
     from .result import Result, ShownCloud
 
     figures: dict[str, Any] = {

@@ -96,7 +96,6 @@ def _compared(
 ) -> list[tuple[Alignment, Deviations]]:
     """Return the deviations of each track with the alignment beside it; none without tracks."""
     from ..alignment.deviations import compared_with
-    from ..alignment.measured import moved
     from .reading import check_same_plane, read_tracks
 
     if not values.filled("TRACKS"):
@@ -104,7 +103,7 @@ def _compared(
     tracks, theirs = read_tracks(values, "TRACKS", progress)
     check_same_plane("TRACKS", theirs.crs_wkt, "INPUT", alignments[0].frame)
     shift = theirs.shift_to(alignments[0].frame)
-    return compared_with(alignments, [moved(one, shift) for one in tracks], progress)
+    return compared_with(alignments, [replace(one, xyz=one.xyz + shift) for one in tracks], progress)
 
 
 JOB = Job(

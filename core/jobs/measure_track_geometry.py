@@ -43,9 +43,10 @@ def _stated(values: Values) -> RailStandard | None:
 
 def _run(values: Values, progress: Progress) -> Result:
     """Measure each track."""
+    from ..checks.listing import summary
     from ..files.layers import network_makers
     from ..rails import RailNetwork
-    from ..report import Origin, summary
+    from ..report import Origin
     from ..squares.remeasuring import measure_rails
     from ..tracks.geometry import measure_track_geometry
     from ..tracks.parallels import widths_by_gauge

@@ -22,10 +22,10 @@ def _check(values: Values) -> None:
 
 def _run(values: Values, progress: Progress) -> Result:
     """Rasterize each class."""
+    from ..checks.density import plausible
     from ..files.raster_file import header_for
     from ..raster import cell_size, rasterize
-    from ..squares.density import plausible
-    from ..squares.grid import MemorySource
+    from ..tiles.grid import MemorySource
     from .clouds import read_points
     from .result import Result
     from .track_inputs import SQUARE_M

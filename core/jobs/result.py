@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..disk import Destination
 from ..errors import ParameterError
-from ..files.layers import Layer
+from ..files.layers import AnyLayer, written_by_name
 
 if TYPE_CHECKING:
     import geopandas
@@ -61,7 +61,7 @@ class Result:
 
     figures: Mapping[str, Any]
     frame: LocalFrame
-    layers: Mapping[str, Callable[[], Layer]] = field(default_factory=dict)
+    layers: Mapping[str, Callable[[], AnyLayer]] = field(default_factory=dict)
     pages: Mapping[str, Callable[[], str]] = field(default_factory=dict)
     sentences: tuple[str, ...] = ()
     cloud: ShownCloud | None = None
@@ -85,7 +85,7 @@ class Result:
         (written,) = self._made([layer])
         from ..files.writing import shapes_of
 
-        columns = dict(zip((one.name for one in written.product.fields), written.written_columns()))
+        columns = written_by_name(written)
         return geopandas.GeoDataFrame(columns, geometry=shapes_of(written, self.frame), crs=self.frame.crs_wkt or None)
 
     def save(self, path: str | Path, layer: str | None = None) -> None:
@@ -128,7 +128,7 @@ class Result:
             raise ParameterError("This result has no report: save its layers.")
         Destination.at(Path(path)).write_text(self.pages["REPORT"]())
 
-    def _made(self, names: Collection[str]) -> list[Layer]:
+    def _made(self, names: Collection[str]) -> list[AnyLayer]:
         """Make the layers of these names."""
         unknown = {name.upper() for name in names} - set(self.layers)
         if unknown:

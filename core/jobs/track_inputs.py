@@ -12,8 +12,8 @@ from ..errors import RailExtractError
 from ..frame import LocalFrame
 from ..progress import Progress
 from ..rails import Centerline, RailLine, TrackGeometry
-from ..squares.spool import SpooledPoints
 from ..standards import RAIL_CLASS
+from ..tiles.spool import SpooledPoints
 from .area_points import Area, spool_points_in
 from .clouds import Bounds
 from .reading import way

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from ..progress import Progress
     from ..run.loop import Runner
     from .lines import Lines
+    from .places import Places
 
 NUMBERS = {
     "SMOOTHING_XY": "smoothing_xy_m",
@@ -131,6 +132,10 @@ class Values(ABC):
     @abstractmethod
     def axes(self, crs_wkt: str | None) -> PlacedAxes:
         """Read AXIS and what states its kilometres, in a coordinate system."""
+
+    @abstractmethod
+    def places(self, name: str, plane: str | None, progress: Progress) -> Places:
+        """Read the features of a layer of any kind, in the plane of the axes."""
 
     @abstractmethod
     def cloud(self, name: str = "INPUT") -> CloudSource:

@@ -77,7 +77,6 @@ class Axes:
 
     Attributes
     ----------
-    axes : tuple of KilometreLine
     notices : tuple of str
         What the user is told of them.
     """
@@ -95,8 +94,6 @@ def make_axes(
     ----------
     lines : sequence of AxisLine
         At least one; those of one name that follow each other are joined.
-    start : Start, optional
-    posts : sequence of Post
     jumps : sequence of Jump
         Stated jumps; M values contain theirs.
 
@@ -277,7 +274,7 @@ class PlacedAxes:
     unit_m : float
         Length of the unit of its coordinates.
     notation : str
-        One of `km_text.NOTATIONS`.
+        One of `text.NOTATIONS`.
     """
 
     axes: Axes
@@ -300,16 +297,7 @@ class PlacedAxes:
         return found
 
     def on_map(self, xy: np.ndarray, ids: Sequence[int], progress: Progress) -> np.ndarray:
-        """Return which places are on the map, (n,) bool, and warn of those that are not.
-
-        Parameters
-        ----------
-        xy : (n, 2) array
-            Coordinates of the system; NaN for a feature without a place, which needs no warning.
-        ids : sequence of int
-            Of the features.
-        progress : Progress
-        """
+        """Return which places are on the map, (n,) bool, and warn of others; a feature without a place has NaN."""
         known = are_places(xy, self.unit_m)
         lost = np.flatnonzero(~known & ~np.isnan(xy).any(axis=1))
         if len(lost):
@@ -358,13 +346,7 @@ AXIS_IN_DEGREES = (
 
 
 def check_jumps(names: Collection[str]) -> None:
-    """Check that a table of jumps has its fields.
-
-    Raises
-    ------
-    RailExtractError
-        One is missing.
-    """
+    """Check that a table of jumps has its fields; raise a `RailExtractError` if one is missing."""
     for name in (BACK, AHEAD):
         if name not in names:
             raise RailExtractError(
@@ -374,17 +356,7 @@ def check_jumps(names: Collection[str]) -> None:
 
 
 def km_of(value: object, field: str, name: str, feature: int) -> float:
-    """Return the kilometre in a field, a number or a text such as 12.3+45.
-
-    Parameters
-    ----------
-    value : object
-    field : str
-        Name of the field.
-    name : str
-        Name of the layer's parameter.
-    feature : int
-        Its id, for the message.
+    """Return the kilometre in a field of a layer's feature, a number or a text such as 12.3+45.
 
     Raises
     ------

@@ -71,10 +71,8 @@ class KilometreLine:
 
     Attributes
     ----------
-    name : str
     xy : (n, 2) array
         Vertices, metres; no two successive ones are equal.
-    stationing : Stationing
     """
 
     name: str
@@ -190,21 +188,9 @@ class KilometreLine:
 
 
 def locate(axes: Sequence[KilometreLine], xy: np.ndarray, notation: str, progress: Progress = SILENT) -> Kilometres:
-    """Find kilometre, offset and side of places along the nearest of several axes.
+    """Find kilometre, offset and side of places, (n, 2) metres, along the nearest of several axes.
 
-    Parameters
-    ----------
-    axes : sequence of KilometreLine
-    xy : (n, 2) array
-        Metres, in the plane of the axes.
-    notation : str
-        One of `km_text.NOTATIONS`.
-    progress : Progress
-
-    Returns
-    -------
-    Kilometres
-        Places further than `BEYOND_M` beyond the ends of all axes have none.
+    Those further than `BEYOND_M` beyond the ends of all axes have none. The notation is one of `text.NOTATIONS`.
     """
     parts = range(0, len(xy), PLACES_AT_ONCE)
     found = [_locate(axes, xy[start : start + PLACES_AT_ONCE], progress) for start in progress.follow(parts)]

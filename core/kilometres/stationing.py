@@ -110,10 +110,8 @@ def stationing_of(length_m: float, s: Sequence[float], km: Sequence[float], jump
 
     Parameters
     ----------
-    length_m : float
     s : sequence of float
         Places, metres, not decreasing; at least one.
-    km : sequence of float
     jumps : sequence of Jump
         In the order of increasing kilometres of the line.
 

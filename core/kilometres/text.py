@@ -53,19 +53,11 @@ NOTATIONS = {
 
 
 def write_km(km: float, notation: str, counts_from_km: float = math.inf) -> str:
-    """Write a kilometre.
+    """Write a kilometre in a notation.
 
-    Parameters
-    ----------
-    km : float
-    notation : str
-        One of `NOTATIONS`.
-    counts_from_km : float
-        Number from which the section behind this place counts again, in an overlap: numbers from there on are written
-        as a length from the last round number before it.
+    In an overlap, numbers from the one from which the section behind this place counts again are written as a length
+    from the last round number before it.
 
-    Examples
-    --------
     >>> [write_km(12.34567, notation) for notation in NOTATIONS]
     ['12.3+45.67', '12+345.67', '12,3 + 46', '7 mi 1181.39 yd']
     >>> write_km(4.35, GERMAN, counts_from_km=4.3)
@@ -87,8 +79,6 @@ def write_km(km: float, notation: str, counts_from_km: float = math.inf) -> str:
 def read_km(text: str) -> float | None:
     """Read a kilometre as a post or a list states it; None if the text is something else.
 
-    Examples
-    --------
     >>> [read_km(text) for text in ("12.345", "12.3+45", "12,3 + 45", "12+345", "signal 7")]
     [12.345, 12.345, 12.345, 12.345, None]
     """

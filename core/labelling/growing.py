@@ -17,17 +17,16 @@ from ..classify.guide import Guide
 from ..clouds.points import Request
 from ..disk import writing
 from ..errors import OffCloudError, OffRailError
-from ..grow.growth import Growth, Stop
+from ..grow.growth import APART, Growth, Growths, Stop, apart_first
 from ..grow.heads import OnHeads
-from ..grow.seeds import APART, Growths, apart_first
 from ..grow.settings import GrowSettings
 from ..polyline import Polyline
 from ..progress import SILENT, Progress
 from ..rails import SearchFigures
 from ..raster import BORDER_CELLS, cell_size
 from ..run.loop import Runner
-from ..squares.grid import Key
-from ..squares.store import files_of, read_stored
+from ..tiles.grid import Key
+from ..tiles.store import files_of, read_stored
 from .files import Choice, Labels, Output, Result, write_labelled
 from .finding import POINT, box_of, sort_files
 
@@ -59,26 +58,17 @@ def grow_files(
         Files, `standards.SEARCHED_CLASSES` classes and extent.
     seeds : sequence of (k, 2) array
         Places on railheads, k = 1, or lines along them, in units of the CRS.
-    settings : GrowSettings
-    choice : Choice
     output : Output
         From `files.plan_output`, for the files of the request.
     folder : Path
         Existing folder for temporary files, 36 bytes per point within reach; the caller removes it.
-    runner : Runner
-        Writes the files.
-    progress : Progress
 
     Raises
     ------
-    CloudError
-        A file is damaged.
-    DiskError
-        The disk is full, or another program has changed an output.
-    ParameterError
-        No seed is in the cloud.
-    RailExtractError
-        No seed is on a rail.
+    CloudError, DiskError
+        See `files.classify_files`.
+    OffCloudError, OffRailError
+        No seed is in the cloud, or on a rail.
     """
     growing, rewriting = progress.divide((7.0, 3.0))
     labels = Labels(request, folder)
@@ -150,12 +140,8 @@ class Cloud:
 
     Parameters
     ----------
-    request : Request
     places : (k, 2) array
         Seeds, metres from the zero of the coordinate system.
-    settings : GrowSettings
-    folder : Path
-    progress : Progress
     """
 
     def __init__(
@@ -176,13 +162,7 @@ class Cloud:
 
 
 def _in_cloud(request: Request, seeds: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """Return the seed, (k,) int, and the place, (k, 2) metres, of all places of seeds that may be in the cloud.
-
-    Raises
-    ------
-    OffCloudError
-        None is.
-    """
+    """Return the seed, (k,) int, and the place, (k, 2) metres, of all places of seeds that may be in the cloud."""
     parts = [_places(request.zero.to_local(np.column_stack([seed[:, :2], np.zeros(len(seed))]))) for seed in seeds]
     owner, places = np.repeat(np.arange(len(seeds)), [len(part) for part in parts]), np.concatenate(parts)
     inside = _inside(places, [box_of(request, [header.extent]) for header in request.headers])

@@ -10,9 +10,9 @@ import numpy as np
 from ..airborne.cross_sections import STATION_M
 from ..airborne.remarks import FLIGHT
 from ..airborne.survey import AirborneTrack, Survey
-from ..progress import counted, written
-from .listing import OFF_RAIL_MM, Finding
-from .markup import legend, made, metres, page, section, table, verdict_box
+from ..checks.listing import OFF_RAIL_MM, Finding
+from ..progress import counted, metres, written
+from .markup import legend, made, page, section, table, verdict_box
 from .origin import stated
 from .plan import Course, draw_plan
 

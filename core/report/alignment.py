@@ -15,7 +15,9 @@ import numpy as np
 from ..alignment.deviations import Deviations
 from ..alignment.elements import Alignment, CantElement, Element, PlanElement, VerticalElement
 from ..alignment.stations import StationRange, stations_of
-from .markup import figure, largest, legend, made, metres, page, rms, section, table, tag, text, tiles
+from ..checks.findings import largest, rms
+from ..progress import metres
+from .markup import figure, legend, made, page, section, table, tag, text, tiles
 from .origin import stated
 from .plots import LEFT, SPACE, TICKS_ACROSS, WIDTH, Curve, Frame, Panel, across, bottom_of, broken, round_up
 

@@ -11,9 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..checks.findings import GAUGE_OFF_MM, GAUGE_SIGMAS, UNSUPPORTED, UNSURE_MM, TrackFindings, gauge_off
+from ..progress import metres
 from ..tracks.geometry import TWIST_BASE_M
-from .findings import GAUGE_OFF_MM, GAUGE_SIGMAS, UNSUPPORTED, UNSURE_MM, TrackFindings, gauge_off
-from .markup import metres, note, tag, text
+from .markup import note, tag, text
 
 MAX_LIMIT_MM = 500
 """Largest limit for which lengths are held: more than the cant of any track."""

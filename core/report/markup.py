@@ -185,36 +185,9 @@ def table(headings: Iterable[str], rows: Iterable[Iterable[object]], class_: str
     return tag("div", tag("table", tag("thead", head), tag("tbody", *body), class_=kind or None), class_=class_)
 
 
-def metres(length_m: float) -> str:
-    """Format a length for reading: 0.4 m, 39 m, 1,234 m, 12.3 km."""
-    if length_m >= 10_000:
-        return f"{length_m / 1000:,.1f} km"
-    return f"{length_m:.1f} m" if length_m < 10 else f"{length_m:,.0f} m"
-
-
 def figure(value: float, form: str = ".1f", unit: str = "mm", unknown: str = "unknown") -> str:
     """Format a number with its unit; another word stands for NaN."""
     return f"{written(value, form)} {unit}" if np.isfinite(value) else unknown
-
-
-def known(values: np.ndarray) -> np.ndarray:
-    """Return the values that are numbers, (k,)."""
-    return values[np.isfinite(values)]
-
-
-def median(values: np.ndarray) -> float:
-    """Return the median of the known values; NaN without any."""
-    return float(np.median(known(values))) if known(values).size else np.nan
-
-
-def rms(values: np.ndarray) -> float:
-    """Return the root mean square of the known values; NaN without any."""
-    return float(np.sqrt(np.mean(known(values) ** 2))) if known(values).size else np.nan
-
-
-def largest(values: np.ndarray) -> float:
-    """Return the known value that is furthest from 0, with its sign; NaN without any."""
-    return float(max(known(values).tolist(), key=abs, default=np.nan))
 
 
 def _value(value: object) -> str:

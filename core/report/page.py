@@ -6,36 +6,13 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 
+from ..checks.findings import DOUBTS, GAUGE_OFF_MM, UNSUPPORTED, Doubt, Findings, TrackFindings, examine, known, median
+from ..checks.listing import Finding, listed, verdict
 from ..frame import LocalFrame
-from ..progress import written
+from ..progress import metres, written
 from ..rails import ENOUGH_CELLS_PER_M, RailNetwork, SearchFigures
-from .findings import (
-    DOUBTS,
-    GAUGE_OFF_MM,
-    UNSUPPORTED,
-    Doubt,
-    Findings,
-    TrackFindings,
-    examine,
-)
 from .limits import limits_table
-from .listing import Finding, listed, verdict
-from .markup import (
-    figure,
-    known,
-    legend,
-    made,
-    median,
-    metres,
-    note,
-    page,
-    section,
-    table,
-    tag,
-    text,
-    tiles,
-    verdict_box,
-)
+from .markup import figure, legend, made, note, page, section, table, tag, text, tiles, verdict_box
 from .plan import Course, draw_plan
 from .track_plots import draw_profiles, draw_strips
 

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from ..checks.findings import DOUBTS, GAUGE_OFF_MM, TrackFindings
 from ..rails import StripCourse
 from ..tracks.geometry import TWIST_BASE_M
-from .findings import DOUBTS, GAUGE_OFF_MM, TrackFindings
 from .markup import legend, tag, text
 from .plots import (
     LEFT,

@@ -7,7 +7,6 @@ from ...core.jobs.declaration import Job
 from .base import JobAlgorithm, RailAlgorithm
 from .check_installation import CheckInstallation
 from .install_packages import InstallPackages
-from .station_along_axis import StationAlongAxis
 
 
 def _of(job: Job) -> type[RailAlgorithm]:
@@ -15,8 +14,5 @@ def _of(job: Job) -> type[RailAlgorithm]:
     return type(job.name, (JobAlgorithm,), {"JOB": job, "__doc__": job.summary})
 
 
-OWN = {algorithm.JOB.name: algorithm for algorithm in (StationAlongAxis,)}
-"""Algorithms that only the toolbox has, by the name of their job."""
-
-ALGORITHMS = (*(OWN.get(job.name) or _of(job) for job in JOBS), InstallPackages, CheckInstallation)
+ALGORITHMS = (*map(_of, JOBS), InstallPackages, CheckInstallation)
 """The jobs, then the setup."""

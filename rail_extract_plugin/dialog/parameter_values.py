@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from ...core.clouds.mask import Mask
     from ...core.files.rail_rasters import RasterSource
     from ...core.jobs.lines import Lines
+    from ...core.jobs.places import Places
     from ...core.kilometres.axes import PlacedAxes
     from ...core.progress import Progress
     from ...core.run.loop import Runner
@@ -105,7 +106,8 @@ class ParameterValues(Values):
             if isinstance(one, kinds.Cloud) and self.filled(one.name):
                 self.cloud(one.name)
             elif isinstance(one, kinds.LayerInput) and not one.transformed and self.filled(one.name):
-                read = self._lines_source if one.kinds == (kinds.LINE,) else self.table
+                readers = {kinds.LINE: self._lines_source, kinds.PLACES: self._places_source}
+                read = self.table if len(one.kinds) > 1 else readers.get(one.kinds[0], self.table)
                 self._opened[one.name] = read(one.name)
 
     def title(self, name: str) -> str:
@@ -128,7 +130,7 @@ class ParameterValues(Values):
         """Return the coordinate system of a layer as WKT; None if it has none."""
         from ..reading.line_layers import wkt_of
 
-        return wkt_of(self._opened[name].sourceCrs()) or None
+        return wkt_of(self._once(name, lambda: self._line_source(name)).sourceCrs()) or None
 
     def rows(self, name: str, progress: Progress) -> Rows:
         """Read the fields of a layer."""
@@ -226,7 +228,13 @@ class ParameterValues(Values):
 
     def axes(self, crs_wkt: str | None) -> PlacedAxes:
         """Read AXIS and what states its kilometres, in a coordinate system."""
-        return self._once("AXIS", lambda: self._axes(system(crs_wkt)))
+        return self._once("kilometres", lambda: self._axes(system(crs_wkt)))
+
+    def places(self, name: str, plane: str | None, progress: Progress) -> Places:
+        """Read the features of a layer of any kind, in the plane of the axes."""
+        from ..reading.places import read_places
+
+        return read_places(self._opened[name], system(plane), self.context, name, progress)
 
     def _axes(self, crs: QgsCoordinateReferenceSystem) -> PlacedAxes:
         """Read AXIS and what states its kilometres, in a coordinate system.
@@ -245,9 +253,14 @@ class ParameterValues(Values):
         sources = AxisSources(self._line_source("AXIS"), start, posts, self.text("POST_FIELD"), jumps)
         return read_axes(sources, crs, self.choice("FORMAT"), self.context)
 
-    def axis_crs(self) -> QgsCoordinateReferenceSystem:
-        """Return the coordinate system of AXIS."""
-        return self._line_source("AXIS").sourceCrs()
+    def _places_source(self, name: str) -> QgsProcessingFeatureSource:
+        """Return a layer with geometries of any kind."""
+        source = self.table(name)
+        if QgsWkbTypes.geometryType(source.wkbType()) == QgsWkbTypes.GeometryType.NullGeometry:
+            from ...core.jobs.places import without_places
+
+            raise without_places(name)
+        return source
 
     def table(self, name: str) -> QgsProcessingFeatureSource:
         """Return a layer or a table."""

@@ -18,11 +18,10 @@ from qgis.core import (
     QgsWkbTypes,
 )
 
-from ...core.clouds.crs import parse_crs, units
+from ...core.clouds.crs import unit_in_plan
 from ...core.errors import CrsError, MissingError
 from ...core.kilometres.axes import (
     AHEAD,
-    AXIS_IN_DEGREES,
     BACK,
     NAME_FIELDS,
     Axes,
@@ -61,7 +60,7 @@ def read_axes(
     crs : QgsCoordinateReferenceSystem
         Projected, or invalid for coordinates in metres that nothing transforms.
     notation : str
-        One of `km_text.NOTATIONS`.
+        One of `text.NOTATIONS`.
     context : QgsProcessingContext
 
     Raises
@@ -71,7 +70,7 @@ def read_axes(
     RailExtractError
         A layer lacks what it should state, or they contradict each other.
     """
-    unit_m = units(parse_crs(wkt_of(crs)))[0] if crs.isValid() else 1.0
+    unit_m = unit_in_plan(wkt_of(crs))
     lines = list(_lines(sources.axis, crs, unit_m, context))
     if not lines:
         raise MissingError("AXIS", "line")
@@ -82,22 +81,6 @@ def read_axes(
         theirs, ours = (one.authid() or one.description() for one in (sources.axis.sourceCrs(), crs))
         made = Axes(made.axes, (f"AXIS is in {theirs} and was transformed to {ours}.", *made.notices))
     return PlacedAxes(made, unit_m, notation)
-
-
-def plane_of(axis: QgsCoordinateReferenceSystem, places: QgsCoordinateReferenceSystem) -> QgsCoordinateReferenceSystem:
-    """Return the coordinate system in which places are located: that of the axis, else that of the places.
-
-    Raises
-    ------
-    CrsError
-        Both are in degrees.
-    """
-    for crs in (axis, places):
-        if crs.isValid() and not crs.isGeographic():
-            return crs
-    if axis.isGeographic() or places.isGeographic():
-        raise CrsError(AXIS_IN_DEGREES)
-    return axis
 
 
 def shapes_in(

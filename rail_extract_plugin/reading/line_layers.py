@@ -23,7 +23,7 @@ from qgis.core import (
 )
 
 from ...core.airborne.survey import Guide, gauge_of
-from ...core.clouds.crs import parse_crs, units
+from ...core.clouds.crs import unit_in_plan
 from ...core.clouds.mask import Mask
 from ...core.design_places import check_line, check_places
 from ...core.errors import CrsError, MissingError, ParameterError, RailExtractError
@@ -228,7 +228,7 @@ def _transformed(
     """Return the features of a layer, all on the map, with their geometries in another coordinate system."""
     change = QgsCoordinateTransform(source.sourceCrs(), crs, context.transformContext())
     features = list(source.getFeatures(QgsFeatureRequest(), GEOMETRY_AS_IT_IS))
-    shapes, unit_m = [feature.geometry() for feature in features], _unit_m(source.sourceCrs())
+    shapes, unit_m = [feature.geometry() for feature in features], unit_in_plan(wkt_of(source.sourceCrs()))
     for feature, shape in zip(features, shapes):
         check_places(bounds_of(shape), f"{name} (feature {feature.id()})", unit_m)
     if not all(transform(shape, change) for shape in shapes):
@@ -243,16 +243,11 @@ def _guides(
     source: QgsProcessingFeatureSource, crs: QgsCoordinateReferenceSystem, context: QgsProcessingContext, name: str
 ) -> Iterator[tuple[QgsFeature, np.ndarray]]:
     """Yield the lines of a layer that show places along tracks, (k, 2), in another coordinate system."""
-    unit_m = _unit_m(crs if crs.isValid() else source.sourceCrs())
+    unit_m = unit_in_plan(wkt_of(crs if crs.isValid() else source.sourceCrs()))
     for feature, shape in _transformed(source, crs, context, name):
         if QgsWkbTypes.geometryType(shape.wkbType()) == QgsWkbTypes.GeometryType.LineGeometry:
             for vertices in _parts(shape, CHORD_TOLERANCE_M):
                 yield feature, check_line(vertices[:, :2], f"{name} (feature {feature.id()})", unit_m)
-
-
-def _unit_m(crs: QgsCoordinateReferenceSystem) -> float:
-    """Return the unit of a coordinate system in plan; that of degrees, or of an unknown one, counts as 1."""
-    return units(parse_crs(wkt_of(crs)))[0] if crs.isValid() and not crs.isGeographic() else 1.0
 
 
 def bounds_of(shape: QgsGeometry) -> np.ndarray:

@@ -118,7 +118,7 @@ def _read_spool(path: Path) -> None:
 
 def _spooled(cloud: Path, folder: Path) -> Sequence:
     from rail_extract.core.clouds.points import ask
-    from rail_extract.core.squares.spool import spool
+    from rail_extract.core.tiles.spool import spool
 
     return spool(ask(cloud, [RAIL]), SPOOL_SIDE_M, folder)
 
@@ -128,9 +128,9 @@ def _make_stored(folder: Path) -> list[Path]:
     from rail_extract.core.frame import LocalFrame
     from rail_extract.core.rails import RailLine
     from rail_extract.core.raster import rasterize
-    from rail_extract.core.squares.grid import Square
     from rail_extract.core.squares.kept import save
     from rail_extract.core.squares.pieces import SquareRails
+    from rail_extract.core.tiles.grid import Square
 
     xyz = np.random.default_rng(0).uniform(0, 20, (500, 3))
     rail = RailLine(xyz, 1, 10, points=500, resid_mm=1.0, sigma_mm=1.0, bridged_m=0.0)

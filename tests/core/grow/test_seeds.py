@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as some
 from rail_extract.core.grow.follow import Reason
-from rail_extract.core.grow.seeds import APART, Growths, apart_first
+from rail_extract.core.grow.growth import APART, Growths, apart_first
 from rail_extract.core.grow.settings import GrowSettings
 from rail_extract.core.parameters import GrowParameters
 from rail_extract.laboratory.ruler.whole_clouds import GrowingCloud

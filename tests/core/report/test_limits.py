@@ -6,12 +6,12 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from rail_extract.core.checks.findings import OFF_GAUGE, examine
 from rail_extract.core.frame import LocalFrame
+from rail_extract.core.progress import metres
 from rail_extract.core.rails import Centerline, RailNetwork, TrackGeometry
 from rail_extract.core.report import build_page
-from rail_extract.core.report.findings import OFF_GAUGE, examine
 from rail_extract.core.report.limits import MAX_LIMIT_MM, QUANTITIES, lengths_beyond, limits_table
-from rail_extract.core.report.markup import metres
 
 COUNT = 101
 

@@ -8,7 +8,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from rail_extract.core.checks.findings import OFF_GAUGE, UNSUPPORTED, UNSURE, examine
+from rail_extract.core.checks.listing import HOLE, LONE_RAIL, OFF_RAIL_MM, list_findings, summary
 from rail_extract.core.frame import LocalFrame
+from rail_extract.core.progress import metres
 from rail_extract.core.rails import (
     Centerline,
     HeadWidths,
@@ -18,10 +21,8 @@ from rail_extract.core.rails import (
     StripCourse,
     TrackGeometry,
 )
-from rail_extract.core.report import build_page, list_findings, summary
-from rail_extract.core.report.findings import OFF_GAUGE, UNSUPPORTED, UNSURE, examine
-from rail_extract.core.report.listing import HOLE, LONE_RAIL, OFF_RAIL_MM
-from rail_extract.core.report.markup import metres, table, tag, text
+from rail_extract.core.report import build_page
+from rail_extract.core.report.markup import table, tag, text
 from rail_extract.core.report.page import ADVICE, CLASSES_ADVICE
 from rail_extract.core.report.plots import ticks
 

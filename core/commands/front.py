@@ -18,11 +18,11 @@ from inspect import Parameter, Signature
 from pathlib import Path
 from typing import Any
 
-from .commands.files import FileValues, run_with_files
-from .jobs import CALLS, declaration
-from .jobs.declaration import Job
-from .jobs.result import Result
-from .progress import SILENT
+from ..jobs import CALLS, declaration
+from ..jobs.declaration import Job
+from ..jobs.result import Result
+from ..progress import SILENT
+from .files import FileValues, run_with_files
 
 __all__ = ["Result", "function_of"]
 

@@ -16,12 +16,12 @@ from pathlib import Path
 
 import numpy as np
 
+from ..clouds.on_heads import heads_of
 from ..clouds.passes import number_passes
 from ..clouds.points import RailPoints, Request, origin_steps
 from ..clouds.readers import CloudHeader
 from ..disk import writing
 from ..frame import LocalFrame
-from ..heads.on_heads import heads_of
 from ..progress import SILENT, Progress
 from ..scratch import discard, scratch_folder
 from .grid import Key, Square, Tiling, around
@@ -113,28 +113,14 @@ def _read(file: str, square: Square, margin_m: float) -> np.ndarray:
 
 
 def spool(request: Request, side_m: float, folder: Path, progress: Progress = SILENT) -> tuple[SpooledPoints, ...]:
-    """Read a cloud once and sort its points into squares on disk.
+    """Read a cloud once and sort its points into squares in a folder that the caller removes.
 
-    Parameters
-    ----------
-    request : Request
-    side_m : float
-        Side of the squares.
-    folder : Path
-        Folder to write to; the caller removes it.
-    progress : Progress
-
-    Returns
-    -------
-    tuple of SpooledPoints
-        One for each requested class that has points, in ascending order of code, all in one local frame.
+    Returns one for each requested class that has points, in ascending order of code, all in one local frame.
 
     Raises
     ------
-    CloudError
-        A file is damaged.
-    DiskError
-        The disk is full.
+    CloudError, DiskError
+        A file is damaged, or the disk is full.
     NoRailPointsError
         No point of the requested classes is within the extent.
     """
@@ -150,24 +136,6 @@ def spool_file(
 
     Two processes may sort the same file at the same time: each writes to its own folder, and the first to finish
     provides the result.
-
-    Parameters
-    ----------
-    request : Request
-    header : CloudHeader
-        Header of the file.
-    side_m : float
-        Side of the squares.
-    folder : Path
-        Folder to write to.
-    progress : Progress
-
-    Raises
-    ------
-    CloudError
-        The file is damaged.
-    DiskError
-        The disk is full.
     """
     mine = folder / _fingerprint(request, header, side_m)
     if os.path.lexists(mine):
@@ -200,13 +168,7 @@ def _sort(request: Request, header: CloudHeader, side_m: float, folder: Path, pr
 
 
 def _checked_report(folder: Path) -> dict:
-    """Read the report of sorted points, and check that all of them are still what was written.
-
-    Raises
-    ------
-    ValueError
-        Something is missing or damaged.
-    """
+    """Read the report of sorted points; `ValueError` unless all of them are still what was written."""
     try:
         digest, text = (folder / REPORT).read_text(encoding="ascii").split("\n")
         if digest != _digest(text):

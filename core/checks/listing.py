@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from ..checks.doubts import ARM_M
-from ..progress import counted
+from ..progress import counted, metres
 from ..rails import RailLine, RailNetwork, TrackGeometry
+from .doubts import ARM_M
 from .findings import (
     DOUBTS,
     FEW,
@@ -29,8 +29,10 @@ from .findings import (
     Place,
     TrackFindings,
     examine,
+    known,
+    median,
+    rms,
 )
-from .markup import known, median, metres, rms
 
 OFF_RAIL_MM = 70.0
 """Possible error where a line is missing, or belongs to no track: a line off by the width of a railhead is off its

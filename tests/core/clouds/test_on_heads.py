@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from rail_extract.core.clouds.on_heads import heads_of, on_heads
 from rail_extract.core.clouds.points import RailPoints
 from rail_extract.core.frame import LocalFrame
-from rail_extract.core.heads.on_heads import heads_of, on_heads
 
 HEAD, WEB, FOOT, SLEEPER = range(4)
 

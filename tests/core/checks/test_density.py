@@ -2,12 +2,7 @@
 
 import numpy as np
 import pytest
-from rail_extract.core.clouds.points import RailPoints
-from rail_extract.core.errors import CloudError
-from rail_extract.core.frame import LocalFrame
-from rail_extract.core.progress import Progress
-from rail_extract.core.rails import RailLine
-from rail_extract.core.squares.density import (
+from rail_extract.core.checks.density import (
     MIN_IN_WINDOW,
     WINDOW_M,
     occupied_squares,
@@ -15,7 +10,12 @@ from rail_extract.core.squares.density import (
     warn_of_airborne,
     warn_of_unexplained,
 )
-from rail_extract.core.squares.grid import MemorySource, lay_out
+from rail_extract.core.clouds.points import RailPoints
+from rail_extract.core.errors import CloudError
+from rail_extract.core.frame import LocalFrame
+from rail_extract.core.progress import Progress
+from rail_extract.core.rails import RailLine
+from rail_extract.core.tiles.grid import MemorySource, lay_out
 
 SIDE_M = 500.0
 RNG = np.random.default_rng(4)

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..clouds.points import RailPoints
 from ..kernels import threads
+from .points import RailPoints
 
 PLACE_M = 0.25
 """Side of the cells, each a place at which a rail is looked at: along it, a gradient of 4 % changes heights by 1 cm."""

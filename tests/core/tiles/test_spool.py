@@ -13,8 +13,8 @@ from rail_extract.core.clouds.points import ask, read_rail_points
 from rail_extract.core.errors import Cancelled, NoRailPointsError
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.progress import Progress
-from rail_extract.core.squares.grid import MemorySource, Square, lay_out
-from rail_extract.core.squares.spool import Census, SpooledPoints, _fingerprint, spool
+from rail_extract.core.tiles.grid import MemorySource, Square, lay_out
+from rail_extract.core.tiles.spool import Census, SpooledPoints, _fingerprint, spool
 
 SIDE = 30.0
 

@@ -14,9 +14,9 @@ from typing import Protocol
 
 import numpy as np
 
+from ..clouds.on_heads import heads_of
 from ..clouds.points import RailPoints
 from ..frame import LocalFrame
-from ..heads.on_heads import heads_of
 from ..rails import SearchFigures
 from ..raster import TILE, RailRaster
 
@@ -37,7 +37,6 @@ class Square:
 
     Attributes
     ----------
-    key : tuple of int
     frame : LocalFrame
         Its origin is the south-western corner of the square; for the whole plane, the origin of the cloud.
     side_m : float
@@ -106,7 +105,6 @@ class SortedPoints:
 
     Attributes
     ----------
-    classes : sequence of PointSource
     search : SearchFigures or None
         What was found, if the points are from a raw cloud.
     only_pairs : bool
@@ -159,7 +157,6 @@ class Tiling:
 
     Attributes
     ----------
-    side_m : float
     margin_m : float
         Distance, less than half a side, beyond the border of a square up to which points belong to it as well.
     """

@@ -16,7 +16,7 @@ from ..errors import CloudError
 from ..polyline import project, runs
 from ..progress import SILENT, Progress
 from ..rails import RailLine
-from .grid import PointSource, Square, around, lay_out
+from ..tiles.grid import PointSource, Square, around, lay_out
 
 WINDOW_M, MIN_IN_WINDOW = 4.0, 10
 """A point with fewer points than this in its cell of the window's size and the eight around it belongs to no rail: the

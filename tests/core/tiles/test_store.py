@@ -3,8 +3,8 @@
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
-from rail_extract.core.squares.grid import Tiling
-from rail_extract.core.squares.store import SortedFile, append, counts_of, files_of, read_stored
+from rail_extract.core.tiles.grid import Tiling
+from rail_extract.core.tiles.store import SortedFile, append, counts_of, files_of, read_stored
 
 POINT = np.dtype([("xyz", "<f8", 3), ("number", "<i8")])
 

@@ -4,7 +4,7 @@ import numpy as np
 from rail_extract.core.clouds.points import RailPoints
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.raster import TILE, rasterize
-from rail_extract.core.squares.grid import (
+from rail_extract.core.tiles.grid import (
     MemorySource,
     Square,
     assembled,
