@@ -292,7 +292,6 @@ class Product:
     ----------
     style : str
         Name of the style that QGIS gives it.
-    fields : tuple of Field
     drawn : str
         First word of its layers in a drawing.
     is_line : bool

@@ -270,13 +270,7 @@ SILENT = Progress()
 
 
 class Until(_Relay):
-    """Cancels after a time.
-
-    Parameters
-    ----------
-    listener : Progress
-    limit_s : float
-    """
+    """Cancels after a time."""
 
     def __init__(self, listener: Progress, limit_s: float) -> None:
         super().__init__(listener)

@@ -46,7 +46,6 @@ class RailStandard:
         Key of `STANDARDS`, or CUSTOM. Keys never change.
     label : str
         Name to show to users.
-    gauge_m, head_width_m : float
     region : str
         Where the profile is laid; empty for CUSTOM.
     sources : str
@@ -175,7 +174,6 @@ def resolve(name: str, gauge_mm: float | None = None, head_width_mm: float | Non
     ----------
     name : str
         A key of `STANDARDS`, or CUSTOM, which needs both numbers.
-    gauge_mm, head_width_mm : float, optional
 
     Raises
     ------
@@ -220,7 +218,6 @@ def closest_standard(spacing_m: float, head_width_m: float) -> RailStandard | No
     ----------
     spacing_m : float
         Distance between the axes of the two rails.
-    head_width_m : float
 
     Returns
     -------
@@ -281,8 +278,6 @@ def read_gauges(
         Millimetres. The width of the railhead may follow a gauge; it is that of the standard otherwise.
     what : str
         Name of the parameter or option, for the error.
-    standard : RailStandard
-    tolerance_m : float
     has_parameter : bool
         See `distinct_gauges`.
 
@@ -324,7 +319,6 @@ def distinct_gauges(gauges_m: Sequence[float], tolerance_m: float, has_parameter
 
     Parameters
     ----------
-    gauges_m : sequence of float
     tolerance_m : float
         Largest deviation of a track from its gauge.
     has_parameter : bool

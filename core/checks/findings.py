@@ -149,12 +149,10 @@ class Findings:
 
     Attributes
     ----------
-    tracks : tuple of TrackFindings
     lonely : tuple of RailLine
         Rails that belong to no track.
     rails_m : float
         Length of all rails.
-    holes : tuple of Hole
     heads : HeadWidths or None
         Width of the heads; only if another one is stated.
     stepped_m : float

@@ -70,7 +70,8 @@ def _drawn(layer: Copy, name: str) -> tuple[Product, bool, list[Shape]]:
         raise ParameterError(f"{name} can only have points, or only lines: choose a GeoPackage.")
     kinds_of = ({"i": int, "f": float}.get(values.dtype.kind, str) for values, _ in _columns(layer))
     fields = tuple(Field(name, kind, "") for name, kind in zip(written_by_name(layer), kinds_of))
-    rows = [[*own.values(), *more] for own, more in zip(layer.originals.rows(), zip(*layer.written_columns()))]
+    more = zip(*layer.written_columns())
+    rows = [[*own.values(), *values] for (_, own), values in zip(layer.originals.rows(), more)]
     shapes = [
         Shape(shapely.get_coordinates(part, include_z=True), rows[number]) for part, number in zip(parts, numbers)
     ]

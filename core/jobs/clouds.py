@@ -56,10 +56,6 @@ def request_points(
 
     Parameters
     ----------
-    source : CloudSource
-    class_codes : sequence of int
-    bounds : callable
-    progress : Progress
     unreadable : list of str, optional
         Gets what is wrong with files that can't be read; without it, one ends the run.
     """
@@ -80,11 +76,8 @@ def read_points(
 
     Parameters
     ----------
-    source : CloudSource
-    class_codes : sequence of int
     bounds : callable
         Returns the extent to read, given the cloud's coordinate system.
-    progress : Progress
     """
     from ..clouds.on_heads import heads_of
     from ..clouds.points import read_requested
@@ -105,8 +98,6 @@ def spool_points(
 
     Parameters
     ----------
-    source, class_codes, bounds, progress
-        See `read_points`.
     side_m : float
         Side of the squares.
     folder : Path

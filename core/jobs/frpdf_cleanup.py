@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from ..errors import RasterError
 from ..frpdf.models import MODELS, Model, choose
-from . import shared
+from . import outputs, shared
 from .declaration import RAIL_WORDS, STEPS, Job, RasterOutput
 
 if TYPE_CHECKING:
@@ -41,14 +41,6 @@ def _planned(values: Values) -> tuple[RasterHeader, Model]:
 
 def model_for(header: RasterHeader, standard: RailStandard, name: str) -> Model:
     """Return the model that the user named, or that a raster names, or that fits its rails; check the cell size.
-
-    Parameters
-    ----------
-    header : RasterHeader
-    standard : RailStandard
-        The raster's rails.
-    name : str
-        Name of a model, or AUTO.
 
     Raises
     ------
@@ -101,7 +93,7 @@ JOB = Job(
     (("numpy",), ("pyproj",), ("cv2", "torch")),
     (shared.RASTER, shared.MODEL, *shared.CLEANUP, *shared.RASTER_RAIL),
     (RasterOutput("OUTPUT", "Cleaned rail raster", "A GeoTIFF; the input of Vectorize Rails."),),
-    (shared.ENGINE_USED,),
+    (outputs.ENGINE_USED,),
     STEPS,
     picture="raster.svg",
     call="clean",

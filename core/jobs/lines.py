@@ -42,7 +42,6 @@ class Lines:
         Feature, its values by the name of the field, and vertices, local metres; z is NaN without heights.
     fields : collection of str
         Names of all fields.
-    frame : LocalFrame
     """
 
     parts: list[tuple[int, Row, np.ndarray]]
@@ -66,10 +65,8 @@ class Lines:
             Of the layer's parameter, for messages.
         parts : iterable of (int, mapping, (n, 3) array)
             With vertices in the coordinate system.
-        fields : collection of str
         system : (str or None, float, float)
             From `system_of`.
-        progress : Progress
 
         Raises
         ------

@@ -52,7 +52,6 @@ class Result:
         Makes a web page, by the name of the output.
     sentences : tuple of str
         The result in words.
-    cloud : ShownCloud, optional
     rasters : mapping of str to callable
         Makes rasters of one grid and their header, None if they are empty, by the name of the output.
     found : object

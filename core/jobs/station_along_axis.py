@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..errors import CrsError
+from ..errors import CrsError, RailExtractError
 from ..fields import EXTENT_FIELDS, STATION_FIELDS
 from . import shared
 from .declaration import ALIGNMENT, LINE_NEEDS, PLACES, RAIL_WORDS, Figure, Job, LayerInput, LayerOutput
@@ -24,6 +24,8 @@ READING, LOCATING = 0.3, 0.7
 
 def _check(values: Values) -> None:
     """Check that the layer has places, and read the axis."""
+    if not values.source("INPUT").kinds:
+        raise RailExtractError("INPUT is a table without places: give a layer of points, lines or polygons.")
     values.prepare(values.system("INPUT"))
     values.axes(_plane(values))
 

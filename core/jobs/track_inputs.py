@@ -35,8 +35,6 @@ class TrackInputs:
 
     Attributes
     ----------
-    centerlines : tuple of Centerline
-    rails : tuple of RailLine
     clouds : tuple of SpooledPoints
         One for each class of the rails; empty without a cloud.
     frame : LocalFrame
@@ -78,10 +76,8 @@ def check_gauges(tracks: TrackInputs, measured: Sequence[TrackGeometry], progres
 
     Parameters
     ----------
-    tracks : TrackInputs
     measured : sequence of TrackGeometry
         One for each centerline.
-    progress : Progress
 
     Raises
     ------

@@ -105,13 +105,6 @@ def limits_table(tracks: Sequence[TrackFindings]) -> str:
 def lengths_beyond(values_mm: np.ndarray, length_m: np.ndarray) -> np.ndarray:
     """Return the lengths with values above 0, 1, 2 mm and so on up to the largest value, (k,) metres.
 
-    Parameters
-    ----------
-    values_mm : (n,) array
-        None below 0; NaN counts nowhere.
-    length_m : (n,) array
-        Length that each value stands for.
-
     Examples
     --------
     >>> lengths_beyond(np.array([0.5, 2.0, 2.1, np.nan]), np.array([1.0, 1.0, 2.0, 1.0])).tolist()

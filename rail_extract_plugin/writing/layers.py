@@ -98,7 +98,7 @@ def _shape_of(layer: Layer) -> QgsWkbTypes.Type:
 
 def _copies(layer: Copy, columns: QgsFields) -> Iterator[QgsFeature]:
     """Copy features with values for the last fields of `columns`; objects become texts."""
-    for original, row in zip(layer.originals.features, zip(*layer.written_columns())):
+    for original, row in zip(layer.originals.stored(), zip(*layer.written_columns())):
         feature = QgsFeature(columns)
         feature.setGeometry(original.geometry())
         own = [
@@ -219,7 +219,7 @@ def output_crs(wkt: str | None) -> QgsCoordinateReferenceSystem:
 
 def _write_copy(values: ParameterValues, name: str, layer: Copy) -> dict[str, str]:
     """Write a copy of a layer of any kind, with further fields; objects, which few formats hold, become texts."""
-    from ..reading.line_layers import MIXED
+    from ..reading.layers import MIXED
 
     source, kept = layer.originals.source, QgsFields()
     for one in source.fields():

@@ -209,11 +209,12 @@ def _make_shapes(folder: Path) -> list[Path]:
 def _read_shapes(path: Path) -> None:
     """Read a vector file as the commands do, for a cloud in another coordinate system."""
     from rail_extract.core.clouds.crs import import_pyproj
-    from rail_extract.core.commands import vectors
+    from rail_extract.core.commands.vectors import read_features
+    from rail_extract.core.jobs.features import read_lines_along, read_mask, read_seeds
 
     wkt = import_pyproj().CRS.from_epsg(32643).to_wkt()
-    for read in (vectors.read_seeds, vectors.read_lines, vectors.read_mask):
-        read(path, wkt)
+    for read in (read_seeds, read_lines_along, read_mask):
+        read(read_features(path, "LAYER"), wkt)
 
 
 def _make_names(folder: Path) -> list[Path]:

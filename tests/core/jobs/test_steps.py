@@ -20,6 +20,12 @@ def source(path):
     return RasterSource(path, open_with_rasterio)
 
 
+def raster_cells(path):
+    """Places of the rail cells, (n, 2)."""
+    (raster,), header = source(path).read(), source(path).header
+    return header.frame.to_crs(np.column_stack([raster.to_local(raster.cells()), np.zeros(raster.count())]))[:, :2]
+
+
 def features(path):
     """Vertices, (n, 3), and values of each line."""
     meta, _, shapes, columns = pyogrio.raw.read(path)
@@ -58,10 +64,14 @@ def test_chained_steps_give_the_lines_of_an_extraction(cloud, tmp_path):
     left, x = points[:, 1] > 3_000_000, points[:, 0] - 500_000
     with_gaps = cloud(points[~((left & (np.abs(x - 4.5) < 1)) | (~left & (np.abs(x - 8) < 1)))])
     whole = {name: tmp_path / f"{name}.gpkg" for name in ("rails", "centerlines")}
+    whole["cleaned"] = tmp_path / "whole.tif"
     rx.extract(with_gaps, **whole, **HOW, workers=1)
     raster, cleaned, rails, tracks = (tmp_path / name for name in ("räster 1.tif", "c.tif", "r.gpkg", "t.gpkg"))
     rx.rasterize(with_gaps, output=raster)
     rx.clean(raster, output=cleaned, **HOW)
+    cells = [np.sort(raster_cells(path), axis=0) for path in (cleaned, whole["cleaned"])]
+    assert len(cells[0]) > 500
+    np.testing.assert_allclose(*cells, atol=1e-3)
     rx.vectorize(cleaned, points=with_gaps, output=rails)
     rx.build_track_centerlines(rails, output=tracks)
     for mine, theirs in zip(features(rails), features(whole["rails"])):

@@ -67,27 +67,3 @@ def test_lines_stations_and_report_from_guides_in_degrees(flown, run_step, tmp_p
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     for words in ("Good", 'aria-label="Map of the tracks"', "<dt>Date</dt>", f"<dd>{CRS} - "):
         assert words in page
-
-
-def test_proposals_are_not_made_which_is_said(flown, run_step, tmp_path, new_feedback):
-    design, path = flown
-    feedback = new_feedback()
-    outputs = {name: tmp_path / f"{name}.gpkg" for name in ("CENTERLINES", "PROPOSED")}
-    done = run_step("airbornecenterlines", {"INPUT": path, "GUIDE": guides(design.tracks), **outputs}, feedback)
-    assert done.ok, done.error
-    assert outputs["CENTERLINES"].exists()
-    assert not outputs["PROPOSED"].exists()
-    assert any("Guides are not proposed: draw them, or import them" in text for text in feedback.warnings)
-
-
-def test_a_cloud_without_the_track_gives_no_line_but_reasons(flown, run_step, tmp_path):
-    design, path = flown
-    guide = guides(design.tracks[-1:], off_m=7.0)
-    outputs = {name: tmp_path / f"{name}.gpkg" for name in ("CENTERLINES", "STATIONS", "FINDINGS")}
-    done = run_step("airbornecenterlines", {"INPUT": path, "GUIDE": guide, "FOOTPRINT": 0.25, **outputs})
-    assert done.ok, done.error
-    assert done.results["CENTERLINE_COUNT"] == 0
-    assert done.results["SEEN_LENGTH"] < 30
-    reasons = [one["reason"] for one in QgsVectorLayer(str(outputs["FINDINGS"]), "findings").getFeatures()]
-    assert reasons
-    assert all(reasons)
