@@ -55,13 +55,24 @@ class Kind:
         Whether the bend may change linearly.
     least_m : float
         Least standard deviation of the errors, metres.
+    shown_m : float
+        See `Rules`; where the line was smoothed.
     """
 
     order: int
     degrees: tuple[int, ...]
     ramps: bool
     least_m: float = 0.0
+    shown_m: float = 0.0
 
+    def shown(self, noise: Noise) -> float:
+        """Return the distance from a curve that no survey shows, metres; 0 where single points scatter."""
+        return self.shown_m if noise.white_m < SMOOTH * self.shown_m else 0.0
+
+
+SMOOTH = 0.2
+"""Share of `Kind.shown_m` below which single points scatter only if the line was smoothed: errors of several lengths
+hang together then, and what the search takes for its noise is less than these."""
 
 LEAST_ERROR_M = 0.001
 """Least standard deviation of a line across and in height, metres: no survey of a track is better. Where single points
@@ -69,7 +80,8 @@ scatter by less, the line was smoothed, and what their errors lack is shared by 
 would be taken for elements."""
 
 PLAN, HEIGHT = Kind(2, (1, 2, 3), True, LEAST_ERROR_M), Kind(2, (1, 2), False, LEAST_ERROR_M)
-CANT = Kind(1, (0, 1), False)
+CANT = Kind(1, (0, 1), False, shown_m=math.sqrt(2.0) * LEAST_ERROR_M)
+"""Kinds of signals. Cant is the difference of two heights."""
 
 
 @dataclass(frozen=True)
@@ -162,7 +174,7 @@ def find_structure(
     noise, pieces = noise_of(signal, tolerance_m, first)
     sigma = noise.effective_m(signal.step_m)
     price = max(math.log(len(signal.s) * (noise.white_m / sigma) ** 2), LEAST_PRICE)
-    rules = Rules(signal.kind.ramps, jumps or not signal.kind.ramps, least_m, price)
+    rules = Rules(signal.kind.ramps, jumps or not signal.kind.ramps, least_m, price, signal.kind.shown(noise))
     chain = _from_pieces(pieces, signal.kind.order, rules)
     return searched(chain, signal.blocks(noise), rules, second), noise
 
