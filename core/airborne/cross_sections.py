@@ -39,11 +39,8 @@ PARABOLA = 4
 LEAST_SIGMA_M = 0.004
 """Standard error of a section below which the scanner itself is not good enough."""
 
-ENOUGH_GAIN, GAIN_SHARE, MOST_EXPECTED = 6.0, 0.3, 60.0
-"""A section shows a track if three of them gain more than this, and more than this share of what is expected."""
-
-FEW_POINTS = 8
-"""Points on a section's bed up to which it shows nothing."""
+ENOUGH_GAIN = 6.0
+"""A section shows a track if three of them gain more than this."""
 
 EDGE_M = 0.01
 """A middle this close to the end of the search lies beyond it."""
@@ -125,16 +122,10 @@ def fit_sections(corridor: Corridor, shape: Shape, reach_m: float, length_m: flo
     here = Fit(
         *(getattr(found, name)[rows, at] for name in ("gain", "both", "flaw", "most", "height", "level", "tilt"))
     )
-    shows = _shows(here, points) & (np.abs(offset) < reach_m - EDGE_M)
+    together = np.convolve(here.both, np.ones(3))[1:-1]
+    shows = (together > ENOUGH_GAIN) & (here.both > 0) & (np.abs(offset) < reach_m - EDGE_M)
     return Sections(offset, np.maximum(1 / np.sqrt(sharp), LEAST_SIGMA_M), here, points, shows)
 
 
 LITTLE_SHARP = 1.0
 """Sharpness of a maximum, 1/m², that states nothing about the middle: a standard error of 1 m."""
-
-
-def _shows(found: Fit, points: np.ndarray) -> np.ndarray:
-    """Return which sections show two rails, together with those next to them."""
-    together, expected = (np.convolve(one, np.ones(3))[1:-1] for one in (found.both, found.most))
-    enough = together > np.maximum(ENOUGH_GAIN, GAIN_SHARE * np.minimum(expected, MOST_EXPECTED))
-    return enough & (found.both > 0) & (points > FEW_POINTS)

@@ -38,9 +38,6 @@ BELOW_M, ABOVE_M = 1.6, 1.1
 CELL_M, CELL_ACROSS_M, TRIM_M = 10.0, 0.25, 0.25
 """Cells, along and across, from whose median no point lies farther: rails stand less above their bed."""
 
-FEW_POINTS = 5
-"""Number of points in a section up to which its level is taken from its neighbours."""
-
 OWN_LEVEL_M, MIN_SHARED = 2.0, 5
 """Distance from the axis within which strips are compared, and the number of sections that must show both."""
 
@@ -194,7 +191,7 @@ def _level(section: np.ndarray, across: np.ndarray, z: np.ndarray, count: int) -
     order = np.lexsort((z[near], section[near]))
     heights, numbers = z[near][order], np.bincount(section[near], minlength=count)
     first = np.concatenate([[0], np.cumsum(numbers)[:-1]])
-    known = numbers > FEW_POINTS
+    known = numbers > 0
     if not known.any():
         return None
     level = np.full(count, np.nan)

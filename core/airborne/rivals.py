@@ -9,19 +9,17 @@ import numpy as np
 from .cross_sections import STATION_M
 from .guide_line import Corridor
 from .ridges import HALF_M, Shape, binned, fit, windows
+from .search import STEP_M
 
 LONG = 7
 """Sections that are looked at as one: one section may be hidden, or mislead."""
 
-STEP_M = 0.05
-"""Distance of the places."""
-
 WIDE_M = 5.6
 """Distance from the line up to which places are compared: tracks of one line are rarely farther apart."""
 
-SAME_M, APART_M, REPEATED_M, TRACKS_APART_M = 0.2, 0.4, 1.1, 2.8
-"""Places this close are the same, those this far apart are others, those less far apart than a gauge have no rail of
-the line, and two tracks are at least this far apart."""
+APART_M, REPEATED_M, TRACKS_APART_M = 0.4, 1.1, 2.8
+"""Places this far apart are others, those less far apart than a gauge have no rail of the line, and two tracks are at
+least this far apart."""
 
 
 @dataclass(frozen=True)
@@ -48,11 +46,9 @@ class Beside:
 
     @property
     def on(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Gain, flaw and expected gain at the best place on the line, (n,) each."""
-        score = np.where(np.abs(self.across) < SAME_M, self.score, -np.inf)
-        best = score.argmax(axis=1)[:, None]
-        gain, flaw, most = (np.take_along_axis(one, best, axis=1)[:, 0] for one in (self.gain, self.flaw, self.most))
-        return gain, flaw, most
+        """Gain, flaw and expected gain on the line, (n,) each."""
+        middle = len(self.across) // 2
+        return self.gain[:, middle], self.flaw[:, middle], self.most[:, middle]
 
     @property
     def rival(self) -> np.ndarray:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..polyline import Polyline
 from .cross_sections import ENOUGH_GAIN, LEAST_SIGMA_M, STATION_M, Sections, fit_sections, measure
-from .curves import Curve, differences, draw_together, smooth
+from .curves import FIRST_TURN_M, Curve, differences, draw_together, smooth
 from .guide_line import STEP_M as VERTEX_M
 from .guide_line import Corridor, Points, gather
 from .ridges import HALF_M, Shape
@@ -23,14 +23,12 @@ MARGIN_M = 0.75
 SLOPE_M = 0.017
 """Standard deviation of the second differences of the height over 10 m."""
 
-COURSE_TURN_M, COURSE_M = 0.03, 0.12
-"""Standard deviation of the third differences of the first curve, through the courses of 5 m, and the standard error of
-their places."""
+COURSE_M = 0.12
+"""Standard error of the places of a course."""
 
 
-SHIFT_LENGTH_M, STRIP_SHIFT_M, MIXED_SECTIONS = 50.0, 0.1, 7
-"""Length of the sections in which strips are fitted alone, standard deviation of the shift between two strips, and the
-sections over which a curve mixes them."""
+SHIFT_LENGTH_M, STRIP_SHIFT_M = 50.0, 0.1
+"""Length of the sections in which strips are fitted alone, and standard deviation of the shift between two strips."""
 
 
 @dataclass(frozen=True)
@@ -131,7 +129,7 @@ def _first(track: Traced) -> Polyline:
     middles = float(track.guide.t[0]) + (np.arange(len(track.across)) + 0.5) * (STATION_M / 2)
     place, normal = track.guide.at(middles), track.guide.left_at(middles)
     weight, rows = np.full(len(place), COURSE_M**-2), differences(len(place), 3)
-    curve = smooth(place + track.across[:, None] * normal, weight, rows, COURSE_TURN_M)
+    curve = smooth(place + track.across[:, None] * normal, weight, rows, FIRST_TURN_M)
     return _axis_through(curve.values, middles, track.guide)
 
 
@@ -182,8 +180,7 @@ def strip_error(refined: Refined) -> np.ndarray:
     one, other = (
         np.bincount(section[seen.corridor.strip == strip], minlength=len(error)).astype(float) for strip in main
     )
-    long = np.ones(min(MIXED_SECTIONS, len(error)))
-    mixed = np.convolve(one - other, long, "same") / np.maximum(np.convolve(one + other, long, "same"), 1.0)
+    mixed = (one - other) / np.maximum(one + other, 1.0)
     normal = seen.axis.left_at(refined.t)
     return np.abs(mixed * (normal @ _strip_shift(seen, main))) / 2
 

@@ -21,8 +21,8 @@ STEP_M, SLOPE_STEP, SLOPES = 0.05, 0.02, 7
 BLOCK = 24
 """Sections that are fitted at once, which limits the memory to about 100 MB."""
 
-LEAST, MOST = -6.0, 40.0
-"""Limits of the evidence of a section, so that none decides alone; the lower one is that of a place out of reach."""
+LEAST = -6.0
+"""Least evidence of a section, so that none decides alone; it is that of a place out of reach."""
 
 SATURATION, ALWAYS = 0.2, 1.0
 """Share of the gain of expected rails up to which evidence counts, and a gain that always does: two real tracks must
@@ -54,9 +54,9 @@ OWN_LENGTH_M, SMOOTHED_SECTIONS = 50.0, 7
 MOST_TOGETHER = 8
 """Tracks whose curves are drawn together: the run time grows with the third power of their number."""
 
-RIVAL_M, RIVAL_SHARE, RIVAL_SECTIONS, SAME_M = 2.5, 0.8, 9, 0.2
-"""Another track is at least this far away and has this share of the score over as many sections; places this close
-are the same."""
+RIVAL_SHARE, RIVAL_SECTIONS, SAME_M = 0.8, 9, 0.2
+"""Another track is at least `NEAR_M` away and has this share of the score over as many sections; places this close are
+the same."""
 
 
 @dataclass(frozen=True)
@@ -119,7 +119,7 @@ def evidence(corridor: Corridor, reach_m: float, shape: Shape) -> Evidence:
         block = slice(first, first + BLOCK)
         found = fit(windows(count[block], width), windows(height[block], width), u, shape)
         gain = np.minimum(found.gain, SATURATION * found.most + ALWAYS) - found.flaw
-        score[block] = np.clip(gain, LEAST, MOST)
+        score[block] = np.maximum(gain, LEAST)
     return Evidence((np.arange(places) - places // 2) * STEP_M, score)
 
 
@@ -269,6 +269,6 @@ def certainty(course: Course, score: np.ndarray, across: np.ndarray) -> np.ndarr
     mean = np.column_stack([np.convolve(one, kernel / len(kernel), "same") for one in score.T])
     apart = np.abs(across - course.across[:, None])
     own = np.where(apart < SAME_M, mean, 0.1).max(axis=1)
-    rival = (apart > RIVAL_M) & (mean > RIVAL_SHARE * own[:, None])
+    rival = (apart > NEAR_M) & (mean > RIVAL_SHARE * own[:, None])
     nearest = np.where(rival, np.abs(across), np.inf).min(axis=1)
     return 1 / (1 + np.exp(-(np.minimum(nearest, 10.0) ** 2 - course.across**2) / (2 * GUIDE_M**2)))

@@ -21,8 +21,8 @@ from ..files.raster_file import write_rasters
 from ..jobs import declaration as kinds
 from ..jobs.clouds import Bounds, CloudSource
 from ..jobs.declaration import Job, Parameter
+from ..jobs.outputs import WEB_PAGES
 from ..jobs.result import Result
-from ..jobs.shared import WEB_PAGES
 from ..jobs.values import Values
 from ..progress import Progress
 from ..run.loop import Runner

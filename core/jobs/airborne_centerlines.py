@@ -10,7 +10,7 @@ from ..fields import AIRBORNE
 from ..parameters import AIRBORNE_CLASSES, AirborneParameters
 from ..progress import Estimating
 from ..standards import SEARCHED_CLASSES
-from . import shared
+from . import outputs, shared
 from .declaration import (
     CLOUD_NEEDS,
     CLOUD_WORDS,
@@ -80,7 +80,7 @@ def _fitted(survey: Survey, values: Values) -> Result:
 
     facts = {"Rail": values.standard().label, "Command": values.command}
     figures: dict[str, Any] = {
-        **shared.figures_of(survey.lines, "CENTERLINE"),
+        **outputs.figures_of(survey.lines, "CENTERLINE"),
         "GUIDE_LENGTH": survey.guides_m,
         "SEEN_LENGTH": survey.seen_m,
         "DENSITY": round(survey.density, 1),
@@ -156,7 +156,7 @@ JOB = Job(
     ),
     (
         replace(
-            shared.CENTERLINES_OUTPUT,
+            outputs.CENTERLINES_OUTPUT,
             help="Lines in the middle of the tracks at the top of the rails, where they are seen, with standard "
             "errors.",
         ),
@@ -169,7 +169,7 @@ JOB = Job(
             optional=True,
             kind=POINT,
         ),
-        shared.FINDINGS_OUTPUT,
+        outputs.FINDINGS_OUTPUT,
         LayerOutput(
             "PROPOSED",
             "Proposed guides",
@@ -178,10 +178,10 @@ JOB = Job(
             optional=True,
             on_demand=True,
         ),
-        shared.REPORT,
+        outputs.REPORT,
     ),
     (
-        *shared.CENTERLINE_FIGURES,
+        *outputs.CENTERLINE_FIGURES,
         Figure("GUIDE_LENGTH", "Length of the guides [m]"),
         Figure("SEEN_LENGTH", "Length on which tracks are seen [m]"),
         Figure("DENSITY", "Points per square metre along the guides"),

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import ParameterError
 from ..fields import DIFFERENCE_FIELDS
 from ..parameters import ComparisonParameters
-from . import shared
+from . import outputs, shared
 from .declaration import (
     ALIGNMENT,
     LINE_NEEDS,
@@ -198,7 +198,7 @@ JOB = Job(
             optional=True,
             kind=POINT,
         ),
-        replace(shared.REPORT, help="A web page with what has moved, the constant shift and the distribution."),
+        replace(outputs.REPORT, help="A web page with what has moved, the constant shift and the distribution."),
     ),
     (
         Figure("COMPARED_LENGTH", "Length on lines of both surveys [m]"),

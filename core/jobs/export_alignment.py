@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from .. import VERSION
-from . import shared
+from . import outputs, shared
 from .declaration import (
     ALIGNMENT,
     ALIGNMENT_WORDS,
@@ -100,7 +100,7 @@ JOB = Job(
             kinds="LandXML files (*.xml);;IFC files (*.ifc);;DXF files (*.dxf)",
         ),
     ),
-    shared.ALIGNMENT_FIGURES,
+    outputs.ALIGNMENT_FIGURES,
     ALIGNMENT,
     picture="alignment.svg",
     guide="alignment_files",

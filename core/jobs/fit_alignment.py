@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from ..parameters import TRANSITIONS, FitParameters
-from . import shared
+from . import outputs, shared
 from .declaration import (
     ALIGNMENT,
     LINE_NEEDS,
@@ -172,7 +172,7 @@ JOB = Job(
             kinds=(TABLE,),
         ),
     ),
-    (shared.ELEMENTS_OUTPUT, shared.DEVIATIONS_OUTPUT, shared.ALIGNMENT_REPORT),
+    (outputs.ELEMENTS_OUTPUT, outputs.DEVIATIONS_OUTPUT, outputs.ALIGNMENT_REPORT),
     (
         Figure("ELEMENT_COUNT", "Number of elements"),
         Figure("RMS", "Root mean square of the slews [mm]"),

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from ..errors import RasterError
 from ..frpdf.models import MODELS, Model, choose
-from . import shared
+from . import outputs, shared
 from .declaration import RAIL_WORDS, STEPS, Job, RasterOutput
 
 if TYPE_CHECKING:
@@ -93,7 +93,7 @@ JOB = Job(
     (("numpy",), ("pyproj",), ("cv2", "torch")),
     (shared.RASTER, shared.MODEL, *shared.CLEANUP, *shared.RASTER_RAIL),
     (RasterOutput("OUTPUT", "Cleaned rail raster", "A GeoTIFF; the input of Vectorize Rails."),),
-    (shared.ENGINE_USED,),
+    (outputs.ENGINE_USED,),
     STEPS,
     picture="raster.svg",
     call="clean",

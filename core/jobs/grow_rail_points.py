@@ -9,7 +9,7 @@ from ..errors import ParameterError
 from ..parameters import GrowParameters
 from ..progress import Estimating
 from ..standards import SEARCHED_CLASSES
-from . import shared
+from . import outputs, shared
 from .classify_rail_points import classified
 from .declaration import (
     CLOUD_NEEDS,
@@ -159,7 +159,7 @@ JOB = Job(
         *shared.CONTENT,
     ),
     (
-        *shared.CLASSIFIED,
+        *outputs.CLASSIFIED,
         LayerOutput(
             "STOPS",
             "Stops",
@@ -169,7 +169,7 @@ JOB = Job(
             kind=POINT,
         ),
     ),
-    shared.CLASSIFIED_FIGURES,
+    outputs.CLASSIFIED_FIGURES,
     RAW_CLOUDS,
     picture="gauge.svg",
     call="grow",

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ..errors import CrsError, ParameterError
-from . import shared
+from . import outputs, shared
 from .declaration import (
     ALIGNMENT,
     ALIGNMENT_WORDS,
@@ -157,17 +157,17 @@ JOB = Job(
         shared.RAILS_OF_CANT,
     ),
     (
-        shared.ELEMENTS_OUTPUT,
+        outputs.ELEMENTS_OUTPUT,
         LayerOutput(
             "AXIS",
             "Axes",
             "A line for each alignment, less than a millimetre off the exact curve, with kilometres as M values.",
             optional=True,
         ),
-        replace(shared.DEVIATIONS_OUTPUT, on_demand=True),
-        shared.ALIGNMENT_REPORT,
+        replace(outputs.DEVIATIONS_OUTPUT, on_demand=True),
+        outputs.ALIGNMENT_REPORT,
     ),
-    shared.ALIGNMENT_FIGURES,
+    outputs.ALIGNMENT_FIGURES,
     ALIGNMENT,
     picture="alignment.svg",
     guide="alignment_files",

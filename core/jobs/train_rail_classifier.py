@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from ..parameters import DEFAULT_EPOCHS
 from ..progress import Estimating, Until
 from ..standards import SEARCHED_CLASSES
-from . import shared
+from . import outputs, shared
 from .declaration import CLOUD_NEEDS, CLOUD_WORDS, RAIL_WORDS, RAW_CLOUDS, Figure, FileInput, FileOutput, Job, Number
 
 if TYPE_CHECKING:
@@ -137,7 +137,7 @@ JOB = Job(
             "Card",
             "A web page with recall and precision by tile, the course of the training, and its settings.",
             optional=True,
-            kinds=shared.WEB_PAGES,
+            kinds=outputs.WEB_PAGES,
         ),
     ),
     (

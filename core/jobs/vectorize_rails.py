@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ..fields import RAILS
-from . import shared
+from . import outputs, shared
 from .declaration import CLOUD_NEEDS, CLOUD_WORDS, RAIL_WORDS, STEPS, Job
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ def _run(values: Values, progress: Progress) -> Result:
         found = lines_of(raster, code, clouds.get(code), settings, share, first_id=len(rails) + 1)
         warn_of_rails(found, code, settings, progress)
         rails += found
-    return Result(shared.figures_of(rails, "RAIL"), frame, {"OUTPUT": lambda: lines_layer(RAILS, rails)})
+    return Result(outputs.figures_of(rails, "RAIL"), frame, {"OUTPUT": lambda: lines_layer(RAILS, rails)})
 
 
 def moved(raster: RailRaster, frame: LocalFrame, other: LocalFrame) -> RailRaster:
@@ -94,8 +94,8 @@ JOB = Job(
         *shared.RASTER_RAIL,
         shared.LEFT_OUT,
     ),
-    (replace(shared.RAILS_OUTPUT, name="OUTPUT", optional=False),),
-    shared.RAIL_FIGURES,
+    (replace(outputs.RAILS_OUTPUT, name="OUTPUT", optional=False),),
+    outputs.RAIL_FIGURES,
     STEPS,
     picture="gauge.svg",
     call="vectorize",
