@@ -21,8 +21,7 @@ DEPTH_M = 0.045
 """Cells up to this far below a top count as part of it: the height of a head."""
 
 AROUND_M = 0.08
-"""Half the side of the window whose cells tell how many an area seen as densely would fill: a head, and a cell on either
-side of it."""
+"""Half the side of the window that shows the density with which a top is seen: a head, and a cell on either side."""
 
 MAX_SHARE = 0.50
 """Largest share of the other seen cells of the window that the top may fill: a rail fills 0.14 to 0.25, with its foot
@@ -47,11 +46,14 @@ class Band:
         Cells that are lower by this share of the height, or by `DEPTH_M` if that is less, are not part of the top.
     slab_m : float
         Tops are compared with their surroundings at thresholds this far apart.
+    shadows : bool
+        Whether rails hide what is behind them: not in a cloud that is matched from images.
     """
 
     low_m: float
     depth_share: float
     slab_m: float
+    shadows: bool = True
 
     def depth_m(self, height_m: np.ndarray | float) -> np.ndarray | float:
         """Return the depth below a top down to which cells are part of it, metres, by its height above the bed."""
@@ -164,7 +166,7 @@ def narrow_tops(tops: Tops, band: Band) -> np.ndarray:
         Window(tops.grid, candidates, round(half_m / tops.grid.cell_m)) for half_m in (WINDOW_M, AROUND_M)
     )
     seen = window.sums(tops.seen).astype(int) - 1
-    larger = (window.size - 1) / (around.size - 1)
+    larger = (window.size - 1) / (around.size - 1) if band.shadows else 0.0
     slab = (top[candidates] - round(band.low_m * MILLIMETRES)) // round(band.slab_m * MILLIMETRES)
     share = np.zeros(len(candidates))
     for number in np.unique(slab).tolist():

@@ -55,7 +55,7 @@ NOISE_SIGMAS = 2.0
 FOUND_HEAD_M, FOUND_SIGMAS = 0.036, 5.0
 """Depth below the crown of what was found in a raw cloud, and standard deviations of the noise if they are more, as in
 clouds from the air. The search takes all of the web down to 50 mm below the top where a rail is seen from the side. It
-shows right below the face, next to the axis: a line would take it for its crown, and a fifth of the face is no loss."""
+shows right below the face, next to the axis: a line would take it for its crown. The lowest part of a face may go."""
 
 FULL_SHARE = 0.5
 """Points in the crown as a share of those in the fullest part of the head: a scanner to one side sees more of the face
