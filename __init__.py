@@ -13,7 +13,7 @@ from .core import VERSION as __version__  # noqa: N811 - the name that packages 
 from .core.jobs import CALLS
 
 if TYPE_CHECKING:
-    from .core.front import Result
+    from .core.commands.front import Result
 
 __all__ = ["Result", "__version__", *CALLS]  # noqa: PLE0604
 
@@ -22,7 +22,7 @@ def __getattr__(name: str) -> Any:
     """Import a public name when it is asked for: QGIS imports this package before numpy may be installed."""
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from .core import front
+    from .core.commands import front
 
     return getattr(front, name)
 

@@ -18,7 +18,6 @@ JOB = "core.commands.jobs"
 COMMANDS = {
     **{name.replace("_", "-"): (f"{JOB}.{name}", job.summary) for name, job in CALLS.items()},
     "extract": ("core.commands.extract.extract", CALLS["extract"].summary),
-    "stations": ("core.commands.lines.stations", "give features their kilometre along an axis"),
     "onnx": ("core.frpdf.onnx.add_arguments", "write the network for other runtimes"),
     "train": ("laboratory.training.train.add_arguments", "train the network on synthetic rasters"),
     "evaluate": ("laboratory.training.evaluate.add_arguments", "compare weights on a fixed set of synthetic rasters"),

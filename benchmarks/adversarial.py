@@ -8,12 +8,12 @@ from __future__ import annotations
 import argparse
 import sys
 
+from rail_extract.core.checks.findings import examine
+from rail_extract.core.checks.listing import verdict
 from rail_extract.core.frpdf.models import NAMES
 from rail_extract.core.parameters import Parameters
 from rail_extract.core.pipeline import extract_rails
 from rail_extract.core.rails import RailNetwork
-from rail_extract.core.report.findings import examine
-from rail_extract.core.report.listing import verdict
 from rail_extract.laboratory.ruler.golden import Variant, build_scene, line_figures, parameters_of
 from rail_extract.laboratory.scenes.adversarial import ADVERSARIAL
 from rail_extract.laboratory.scenes.scene import Scene

@@ -1,8 +1,6 @@
 """Prints how well tracks are fitted in simulated airborne clouds: seen, right, standard errors, switches, and speed.
 
-With --search: how well guides are proposed for clouds without any, and how many metres of them are false.
-
-Usage: python benchmarks/airborne.py [--seeds 3] [--first 1] [--search] [--rows ROW ...]
+Usage: python benchmarks/airborne.py [--seeds 3] [--first 1] [--rows ROW ...]
 """
 
 from __future__ import annotations
@@ -11,13 +9,11 @@ import argparse
 import time
 
 import numpy as np
-from rail_extract.core.airborne.axis import axis_of_guide
 from rail_extract.core.airborne.fitting import SEEN, fit_tracks
-from rail_extract.laboratory.airborne.catalogue import FlownScene
+from rail_extract.core.airborne.guide_line import axis_of_guide
 from rail_extract.laboratory.airborne.designs import SPACING_M, Design, canted_curve, curved_line, drawn_together, yard
 from rail_extract.laboratory.airborne.flight import Flight, fly
-from rail_extract.laboratory.airborne.landscapes import countryside, railway
-from rail_extract.laboratory.ruler.airborne import Stationwise, compare_guides, compare_stations, proposed
+from rail_extract.laboratory.ruler.airborne import Stationwise, compare_stations
 
 REACH_M, RAIL_HEIGHT_M = 3.0, 0.17
 
@@ -30,13 +26,6 @@ FLIGHTS = {
     "yard, 50 cm, 10 per m2": (yard, 10, 0.5),
 }
 """Design, points per square metre and footprint of each row."""
-
-SEARCHES = {
-    "railway beside roads and fields, 25 cm, 10 per m2": (railway, 10, 0.25),
-    "railway beside roads and fields, 25 cm, 5 per m2": (railway, 5, 0.25),
-    "roads and fields only, 25 cm, 10 per m2": (countryside, 10, 0.25),
-}
-"""The same for searches without a guide."""
 
 APART_M = ((3.5, np.inf), (1.6, 3.5), (0.5, 1.6), (0.0, 0.5))
 """Distances from the next track by which the stations of yards are listed."""
@@ -62,45 +51,13 @@ def measured(design: Design, density: float, footprint_m: float, seed: int) -> t
     return Stationwise.joined(rows), sum(axis.t[-1] for axis in axes) / 1000, seconds
 
 
-def searched(design: Design, density: float, footprint_m: float, seed: int) -> tuple[float, float, float, float, float]:
-    """Return the length of tracks with a proposed guide, that of all, of false guides, the area in km2, and seconds."""
-    flight = Flight(density, footprint_m)
-    scene = FlownScene(design, flight, fly(design.world, design.where, design.width_m, flight, seed))
-    start = time.process_time()
-    found = proposed(scene)
-    seconds = time.process_time() - start
-    guided = compare_guides(scene, found)
-    area_km2 = len(scene.cloud.xyz) / density / 1e6
-    return guided.right_m, guided.visible_m, guided.false_m, area_km2, seconds
-
-
-def print_searches(rows: list[str], seeds: range) -> None:
-    """Print how well guides are proposed."""
-    print("| scene | tracks | found | false | false per km2 | s per km2 |")
-    print("|---|---|---|---|---|---|")
-    for name in rows:
-        make, density, footprint_m = SEARCHES[name]
-        runs = np.array([searched(make(seed), density, footprint_m, seed) for seed in seeds])
-        right_m, all_m, false_m, area_km2, seconds = runs.sum(axis=0)
-        share = f"{100 * right_m / all_m:.0f} %" if all_m else ""
-        print(
-            f"| {name} | {all_m:.0f} m | {share} | {false_m:.0f} m | {false_m / area_km2:.0f} m "
-            f"| {seconds / area_km2:.0f} |",
-            flush=True,
-        )
-
-
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, default=3, help="designs of each row (default: 3)")
     parser.add_argument("--first", type=int, default=1, help="seed of the first (default: 1)")
-    parser.add_argument("--rows", nargs="*", choices=[*FLIGHTS, *SEARCHES], help="rows (default: all)")
-    parser.add_argument("--search", action="store_true", help="search without guides instead")
+    parser.add_argument("--rows", nargs="*", choices=FLIGHTS, help="rows (default: all)")
     args = parser.parse_args()
-    if args.search:
-        print_searches(args.rows or list(SEARCHES), range(args.first, args.first + args.seeds))
-        return
     print("| scene | stations | seen | within 10 cm | across, rms | height, sd | 95 % interval | s per km |")
     print("|---|---|---|---|---|---|---|---|")
     for name in args.rows or list(FLIGHTS):

@@ -1,7 +1,8 @@
 """Print how far rails are followed from one click each in raw clouds, and which points they get.
 
 Run `python benchmarks/growing.py [--seed N] [SCENE ...]`. Each rail is clicked once, in the middle or where it is seen
-next to it, up to 6 cm beside its axis.
+next to it, up to 6 cm beside its axis. `python benchmarks/growing.py --axis 500 1000 2000` grows such lengths of track
+from a seed per metre instead, as a digitized axis has them.
 """
 
 from __future__ import annotations
@@ -12,13 +13,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from rail_extract.core.grow.growth import Growth, grow
+from rail_extract.core.grow.growth import APART, Growth, Growths, apart_first, grow
 from rail_extract.core.grow.heads import Rail
 from rail_extract.core.grow.settings import GrowSettings
 from rail_extract.core.polyline import Polyline, project
 from rail_extract.laboratory.ruler.classification import truth
 from rail_extract.laboratory.ruler.lines import cut
 from rail_extract.laboratory.ruler.whole_clouds import GrowingCloud
+from rail_extract.laboratory.scenes import raw_strips
 from rail_extract.laboratory.scenes.raw import RawScene
 from rail_extract.laboratory.scenes.raw_catalogue import AIR, RAW_SCENES
 from scipy.spatial import cKDTree
@@ -33,6 +35,9 @@ RIGHT_M = 0.05
 
 SEEN_M = 0.10
 """Distance from a place on a rail to the nearest point of its head within which it is seen."""
+
+AXIS_RADIUS_M, AXIS_PER_M2 = 10_000.0, 500.0
+"""Radius of the track along an axis, and points per square metre of a strip of 3 m."""
 
 HEADER = (
     "Length followed, as a share of that of the rails that were clicked (more where a branch leads into its track);\n"
@@ -65,7 +70,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("scenes", nargs="*", metavar="SCENE", help=f"of {', '.join(RAW_SCENES)}")
     parser.add_argument("--seed", type=int, default=SEED, help=f"of the scenes (default {SEED})")
+    parser.add_argument("--axis", type=float, nargs="+", metavar="M", help="lengths of track with a seed per metre")
     arguments = parser.parse_args()
+    if arguments.axis:
+        print(f"{'track':>10}{'seeds':>10}{'growths':>10}{'followed':>10}{'s':>10}{'ms/m':>10}")
+        for length_m in arguments.axis:
+            print(along_axis(length_m), flush=True)
+        return
     print(HEADER)
     names = ("scene", "rails", "followed", "recall", "prec.", "false m", "across", "height", "s/rail")
     print(f"{names[0]:<18}" + "".join(f"{name:>10}" for name in names[1:]))
@@ -73,6 +84,22 @@ def main() -> None:
         scene = RAW_SCENES[name](arguments.seed)
         if scene.rails:
             print(text(name, measured(scene, name in AIR)), flush=True)
+
+
+def along_axis(length_m: float) -> str:
+    """Grow a track from a seed per metre; returns a row with the length that was followed and the processor time."""
+    settings = GrowSettings(raw_strips.GAUGE_M, raw_strips.WIDTH_M)
+    track = raw_strips.strip(length_m, 1 / AXIS_RADIUS_M, per_m2=AXIS_PER_M2)
+    heads = GrowingCloud(track.xyz, settings).heads
+    seeds = np.array([track.at(along, raw_strips.SPACING_M / 2) for along in np.arange(1.0, length_m)])
+    start, growths = time.process_time(), Growths(heads, settings)
+    for at in apart_first(seeds, APART * settings.parameters.max_length_m):
+        growths.add(seeds[at])
+    growths.reach_on()
+    seconds = time.process_time() - start
+    followed_m = sum(growth.rails[0].length_m for growth in growths.grown)
+    row = (f"{length_m:.0f} m", len(seeds), len(growths.grown), f"{followed_m:.0f} m")
+    return "".join(f"{value:>10}" for value in (*row, f"{seconds:.1f}", f"{1000 * seconds / length_m:.1f}"))
 
 
 def measured(scene: RawScene, wide: bool) -> Row:

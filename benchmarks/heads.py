@@ -22,8 +22,8 @@ from rail_extract.core.lines.network import LineNetwork
 from rail_extract.core.parameters import Parameters
 from rail_extract.core.rails import RailLine
 from rail_extract.core.raster import cell_size
-from rail_extract.core.squares.grid import MemorySource, lay_out
 from rail_extract.core.squares.steps import clean_square, draw_lines, engine_for, measure_lines, square_side
+from rail_extract.core.tiles.grid import MemorySource, lay_out
 from rail_extract.laboratory.ruler.lines import match
 from rail_extract.laboratory.scenes import adversarial, plain, strips, switches, uneven
 from rail_extract.laboratory.scenes.scene import RAIL, Scene

@@ -19,10 +19,10 @@ import numpy as np
 from rail_extract.core.checks.gauge_estimate import measure_spacings
 from rail_extract.core.classify.settings import Settings
 from rail_extract.core.clouds.las import laspy
+from rail_extract.core.clouds.on_heads import on_heads
 from rail_extract.core.clouds.points import RailPoints
 from rail_extract.core.errors import ParameterError, RailExtractError
 from rail_extract.core.frame import LocalFrame
-from rail_extract.core.heads.on_heads import on_heads
 from rail_extract.core.learned.model import SHIPPED
 from rail_extract.core.parameters import Parameters
 from rail_extract.core.pipeline import extract_rails

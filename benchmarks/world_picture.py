@@ -63,8 +63,8 @@ def draw(world: World, judged: Judged, stem: Path) -> Iterator[Path]:
 
 def _write_lines(world: World, judged: Judged, path: Path) -> Path:
     """Write rails, centerlines and findings into a GeoPackage."""
-    from rail_extract.core.output.layers import network_layers
-    from rail_extract.core.output.writing import write_layers
+    from rail_extract.core.files.layers import network_layers
+    from rail_extract.core.files.writing import write_layers
 
     network, scene = judged.network, world.scene
     path.unlink(missing_ok=True)

@@ -76,8 +76,6 @@ def checked(value: float, kind: Kind, where: str, name: str) -> float:
 
     Parameters
     ----------
-    value : float
-    kind : Kind
     where, name : str
         What states the number, and as what, for the message.
 

@@ -165,6 +165,7 @@ DIFFERENCE_FIELDS = (
     Field("shift_mm", float, "part of across_mm that is the constant shift, millimetres", 1),
     Field("shiftz_mm", float, "part of height_mm that is the constant shift, millimetres", 1),
     Field("moved", int, "1 where the line has moved by more than three standard errors, across or in height; else 0"),
+    Field("shifted", int, "1 where the constant shift alone exceeds three standard errors; else 0"),
 )
 """All differences are those of the other survey from the reference."""
 
@@ -208,11 +209,6 @@ AIRBORNE_FIELDS = (
     Field(
         "hint", int, "1 where the cloud has too few points for its footprint, so that the line is only a hint; else 0"
     ),
-)
-PROPOSED_FIELDS = (
-    Field("guide_id", int, "number of the proposal, the longest first"),
-    Field("score", float, "share of its stations at which two rails on a bed are seen, per cent", 0),
-    LENGTH,
 )
 AIRBORNE_STATION_FIELDS = (
     Field("track_id", int, "number of the line; empty where there is none"),
@@ -268,7 +264,7 @@ ELEMENT_FIELDS = (
     Field("r_fit_m", float, "radius of an arc or a parabola as fitted; the next fit holds r1_m where you change it", 4),
     Field("s_fit_m", float, "s_from as fitted; the next fit holds s_from where you change it", 4),
 )
-"""The element table: `alignment.table` writes and reads its rows. A shapefile cuts its long names."""
+"""The element table: `files.table` writes and reads its rows. A shapefile cuts its long names."""
 
 DEVIATION_FIELDS = (
     Field("track_id", int, "number of the track"),
@@ -296,7 +292,6 @@ class Product:
     ----------
     style : str
         Name of the style that QGIS gives it.
-    fields : tuple of Field
     drawn : str
         First word of its layers in a drawing.
     is_line : bool
@@ -328,7 +323,6 @@ LOCATED_FINDINGS = Product("findings", (*FINDING_FIELDS, *KM_FIELDS), "FINDINGS"
 """With an axis."""
 
 STOPS = Product("stops", STOP_FIELDS, "STOPS", is_line=False)
-PROPOSED = Product("proposed", PROPOSED_FIELDS, "GUIDES")
 AIRBORNE = Product("airborne", AIRBORNE_FIELDS, "TRACK", layer="centerlines")
 STATIONS = Product("stations", AIRBORNE_STATION_FIELDS, "STATIONS", is_line=False)
 DIFFERENCES = Product("differences", DIFFERENCE_FIELDS, "DIFFERENCES", is_line=False)
@@ -339,7 +333,7 @@ PLACES = Product("places", (*STATION_FIELDS, *EXTENT_FIELDS), "PLACES")
 """The fields that copies of layers of any kind get in addition; their style only names these."""
 
 PRODUCTS = (
-    *(RAILS, CENTERLINES, QUALITY, LOCATED_QUALITY, FINDINGS, LOCATED_FINDINGS, STOPS, PROPOSED, AIRBORNE, STATIONS),
+    *(RAILS, CENTERLINES, QUALITY, LOCATED_QUALITY, FINDINGS, LOCATED_FINDINGS, STOPS, AIRBORNE, STATIONS),
     *(DIFFERENCES, ELEMENTS, AXES, DEVIATIONS, PLACES),
 )
 """Every kind of layer that a run can write."""

@@ -249,17 +249,28 @@ def counted(count: int, one: str, many: str = "") -> str:
     return f"{count:,} {one if count == 1 else many or one + 's'}"
 
 
+def metres(length_m: float) -> str:
+    """Format a length for reading: 0.4 m, 39 m, 1,234 m, 12.3 km."""
+    if length_m >= 10_000:
+        return f"{length_m / 1000:,.1f} km"
+    return f"{length_m:.1f} m" if length_m < 10 else f"{length_m:,.0f} m"
+
+
+def written(value: float, form: str = ".1f") -> str:
+    """Write a number, for messages; what rounds to 0 is 0, without a minus.
+
+    >>> written(-1.26), written(-0.04), written(-0.04, "+.1f")
+    ('-1.3', '0.0', '+0.0')
+    """
+    rounded = f"{value:{form}}"
+    return rounded if rounded.strip("+-0.") else f"{0.0:{form}}"
+
+
 SILENT = Progress()
 
 
 class Until(_Relay):
-    """Cancels after a time.
-
-    Parameters
-    ----------
-    listener : Progress
-    limit_s : float
-    """
+    """Cancels after a time."""
 
     def __init__(self, listener: Progress, limit_s: float) -> None:
         super().__init__(listener)

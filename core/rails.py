@@ -98,7 +98,6 @@ class RailLine:
     xyz : (n, 3) array
         Vertices in local metres, from the western end, or from the southern end if the line runs within one degree of
         north. z is NaN everywhere if no points gave heights.
-    rail_id, class_code : int
     points : float
         Number of points that support the line; for part of a line, its share of them, which may be a fraction.
     resid_mm : float
@@ -190,7 +189,6 @@ class Centerline:
     ----------
     xyz : (n, 3) array
         Vertices in local metres, directed like `RailLine.xyz`.
-    track_id, class_code : int
     left_ids, right_ids : tuple of int
         Rails on either side, seen along the line, in order along the line.
     gauge_mm, gaugesd_mm : float
@@ -247,7 +245,6 @@ class Kilometres:
         Name of the axis; None where the place is beyond all axes, as are the following then, and `km` NaN.
     piece : object
         Number of the section of the axis between two jumps of the kilometres, from 1.
-    km : float
     km_text : object
         The kilometre as railways write it.
     offset_m : float
@@ -288,7 +285,6 @@ class TrackGeometry:
 
     Attributes
     ----------
-    track_id : int
     xyz : (n, 3) array
         Stations on the centerline in local metres.
     chainage_m : float
@@ -456,8 +452,6 @@ class RailNetwork:
 
     Attributes
     ----------
-    rails : tuple of RailLine
-    centerlines : tuple of Centerline
     frame : LocalFrame
         Converts the lines' local metres to the cloud's coordinates.
     engine : str

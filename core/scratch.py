@@ -60,7 +60,6 @@ def sweep(parent: Path, rescue: Callable[[Path], None] | None = None) -> None:
 
     Parameters
     ----------
-    parent : Path
     rescue : callable, optional
         Called with each such folder before it is removed.
     """

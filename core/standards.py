@@ -46,7 +46,6 @@ class RailStandard:
         Key of `STANDARDS`, or CUSTOM. Keys never change.
     label : str
         Name to show to users.
-    gauge_m, head_width_m : float
     region : str
         Where the profile is laid; empty for CUSTOM.
     sources : str
@@ -64,6 +63,11 @@ class RailStandard:
     def profile(self) -> str:
         """Name of the profile to show to users, without the gauge."""
         return self.label.rpartition(",")[0]
+
+    @property
+    def is_usual(self) -> bool:
+        """Whether the profile is that of the default."""
+        return self.name.rpartition("_")[0] == DEFAULT.rpartition("_")[0]
 
     @property
     def description(self) -> str:
@@ -170,7 +174,6 @@ def resolve(name: str, gauge_mm: float | None = None, head_width_mm: float | Non
     ----------
     name : str
         A key of `STANDARDS`, or CUSTOM, which needs both numbers.
-    gauge_mm, head_width_mm : float, optional
 
     Raises
     ------
@@ -215,29 +218,39 @@ def closest_standard(spacing_m: float, head_width_m: float) -> RailStandard | No
     ----------
     spacing_m : float
         Distance between the axes of the two rails.
-    head_width_m : float
 
     Returns
     -------
     RailStandard or None
-        None if no standard has such a gauge.
+        None if no standard has such a gauge, nor rails as far apart: heads in blunt clouds, or more than heads in a
+        class, look wider than they are, and the distance is right nevertheless. The usual profile of a gauge stands
+        for the others then.
 
     Examples
     --------
     >>> closest_standard(1.0619, 0.0622).name
     'IN_75R_1000'
     """
-    gauge_m = spacing_m - head_width_m
-    nearest_m = min((one.gauge_m for one in STANDARDS.values()), key=lambda one: abs(one - gauge_m))
-    if abs(nearest_m - gauge_m) > SAME_GAUGE_M:
-        return None
+
+    def apart(standard: RailStandard) -> float:
+        return abs(standard.gauge_m + standard.head_width_m - spacing_m)
 
     def misfit(standard: RailStandard) -> float:
-        spacing_off_m = abs(standard.gauge_m + standard.head_width_m - spacing_m)
-        usual = standard.name.rsplit("_", 1)[0] == DEFAULT.rsplit("_", 1)[0]
-        return spacing_off_m + abs(standard.head_width_m - head_width_m) - SAME_M * usual
+        return apart(standard) + abs(standard.head_width_m - head_width_m) - SAME_M * standard.is_usual
 
-    return min((one for one in STANDARDS.values() if one.gauge_m == nearest_m), key=misfit)
+    gauge_m = spacing_m - head_width_m
+    nearest = min(STANDARDS.values(), key=lambda one: abs(one.gauge_m - gauge_m))
+    if abs(nearest.gauge_m - gauge_m) <= SAME_GAUGE_M:
+        return min(of_gauge(nearest.gauge_m), key=misfit)
+    nearest = min(STANDARDS.values(), key=apart)
+    if apart(nearest) > SAME_GAUGE_M:
+        return None
+    return min(of_gauge(nearest.gauge_m), key=lambda one: (not one.is_usual, apart(one)))
+
+
+def of_gauge(gauge_m: float) -> list[RailStandard]:
+    """Return the standards of a gauge."""
+    return [one for one in STANDARDS.values() if one.gauge_m == gauge_m]
 
 
 def _custom(gauge_m: float, head_width_m: float) -> RailStandard:
@@ -265,8 +278,6 @@ def read_gauges(
         Millimetres. The width of the railhead may follow a gauge; it is that of the standard otherwise.
     what : str
         Name of the parameter or option, for the error.
-    standard : RailStandard
-    tolerance_m : float
     has_parameter : bool
         See `distinct_gauges`.
 
@@ -308,7 +319,6 @@ def distinct_gauges(gauges_m: Sequence[float], tolerance_m: float, has_parameter
 
     Parameters
     ----------
-    gauges_m : sequence of float
     tolerance_m : float
         Largest deviation of a track from its gauge.
     has_parameter : bool

@@ -35,7 +35,7 @@ class RailExtractProvider(QgsProcessingProvider):
     def supportedOutputVectorLayerExtensions(self) -> list[str]:
         """Return the suffixes of the formats that keep heights, fields, coordinates and the coordinate system.
 
-        DXF and CSV, which do not, are written for other programs; see `core.output.exchange`.
+        DXF and CSV, which do not, are written for other programs; see `core.files.exchange`.
         """
         return ["gpkg", "shp", "geojson", "fgb", "gml", "dxf", "csv"]
 

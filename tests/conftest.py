@@ -43,3 +43,16 @@ def random_arrays():
             values = np.full(array.shape, float(name.endswith(".1.weight")))
         arrays[name] = values.astype(np.float32)
     return arrays
+
+
+@pytest.fixture
+def small_training(monkeypatch):
+    """Steps of a training that are fast, also on computers that do other work: each waits for the slowest thread."""
+    torch = pytest.importorskip("torch")
+    from rail_extract.core.learned import training
+
+    monkeypatch.setattr(training, "BATCH", 2)
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    yield
+    torch.set_num_threads(threads)

@@ -1,14 +1,16 @@
 """Write the versions and checksums of the packages that Install Packages downloads, for every system and Python.
 
-Run it before a release, look at the difference, and run the tests: the plugin then installs exactly these files.
+Run it before a release, after `pip install uv`, look at the difference, and run the tests: the plugin then installs
+exactly these files. The list has none of PyTorch's own builds, CPU for Linux and CUDA for Windows, which are on an
+index of their own.
 """
 
 from __future__ import annotations
 
-import json
+import os
+import re
 import subprocess
 import sys
-import tempfile
 from collections import defaultdict
 from pathlib import Path
 
@@ -18,18 +20,22 @@ PYTHONS = ("3.9", "3.10", "3.11", "3.12", "3.13", "3.14")
 """From that of QGIS 3.22 to that of QGIS 4."""
 
 SYSTEMS = {
-    "Windows": ("win_amd64",),
-    "Linux, Intel": ("manylinux_2_28_x86_64", "manylinux_2_17_x86_64", "manylinux2014_x86_64"),
-    "Linux, ARM": ("manylinux_2_28_aarch64", "manylinux_2_17_aarch64", "manylinux2014_aarch64"),
-    "macOS, Intel": tuple(
-        f"macosx_{release}_x86_64" for release in ("14_0", "13_0", "12_0", "11_0", "10_13", "10_12", "10_9")
-    ),
-    "macOS, Apple": tuple(f"macosx_{release}_arm64" for release in ("14_0", "13_0", "12_0", "11_0")),
+    "win32-amd64": "x86_64-pc-windows-msvc",
+    "linux-x86_64": "x86_64-manylinux_2_28",
+    "linux-aarch64": "aarch64-manylinux_2_28",
+    "darwin-x86_64": "x86_64-apple-darwin",
+    "darwin-arm64": "aarch64-apple-darwin",
 }
-"""Names of the oldest systems for which packages are taken, as in the names of wheels."""
+"""Systems as in `locked.SYSTEMS`, and as uv names the oldest ones for which packages are taken."""
 
 REQUIREMENTS = ("laspy[lazrs]", "opencv-python-headless==4.11.0.86", "pyproj", "pip<26")
 """This OpenCV is the latest that works with numpy 1, which most versions of QGIS contain, and with numpy 2."""
+
+OPTIONAL = ("torch",)
+"""Not every system has a build of it for every Python."""
+
+MACOS = {REQUIREMENTS: "14.0", OPTIONAL: "12.0"}
+"""The oldest macOS: that of pyproj's builds for Intel, and one before the newest that PyTorch's newest builds need."""
 
 NOT_LOCKED = ("numpy",)
 """Of QGIS."""
@@ -38,38 +44,46 @@ HEAD = """# Versions and checksums of what Install Packages downloads; `python t
 """
 
 
-def resolve(python: str, tags: tuple[str, ...]) -> dict[tuple[str, str], str]:
-    """Return the checksums of the wheels for a system, by name and version."""
-    with tempfile.TemporaryDirectory() as folder:
-        report = Path(folder) / "report.json"
-        call = [sys.executable, "-m", "pip", "install", "--quiet", "--dry-run", "--ignore-installed"]
-        call += ["--report", str(report), "--target", folder, "--python-version", python, "--only-binary=:all:"]
-        call += [word for tag in tags for word in ("--platform", tag)]
-        subprocess.run([*call, *REQUIREMENTS], check=True)
-        found = json.loads(report.read_text(encoding="utf-8"))["install"]
-    return {
-        (item["metadata"]["name"].lower(), item["metadata"]["version"]): item["download_info"]["archive_info"][
-            "hashes"
-        ]["sha256"]
-        for item in found
-    }
+def resolve(python: str, system: str, requirements: tuple[str, ...]) -> dict[str, set[str]]:
+    """Return the checksums of the files for a system, by name and version; none if there are no such files."""
+    call = ["uv", "pip", "compile", "-", "--no-header", "--no-annotate", "--generate-hashes", "--only-binary=:all:"]
+    call += ["--python-version", python, "--python-platform", SYSTEMS[system], "--no-python-downloads"]
+    environment = {**os.environ, "MACOSX_DEPLOYMENT_TARGET": MACOS[requirements]}
+    found = subprocess.run(call, input="\n".join(requirements), capture_output=True, text=True, env=environment)
+    if found.returncode and requirements != OPTIONAL:
+        raise SystemExit(found.stderr)
+    print(f"Python {python}, {system}: {found.stderr.strip().splitlines()[-1]}", file=sys.stderr)
+    lines = found.stdout.replace("\\\n", "").splitlines()
+    return {line.split()[0]: set(re.findall(r"--hash=(sha256:[0-9a-f]{64})", line)) for line in lines}
+
+
+def places(found: set[tuple[str, str]]) -> list[str]:
+    """Write Pythons and systems, those on all systems without the system.
+
+    >>> places({("3.9", system) for system in SYSTEMS} | {("3.10", "win32-amd64")})
+    ['3.9', '3.10:win32-amd64']
+    """
+    written = []
+    for python in PYTHONS:
+        systems = [system for system in SYSTEMS if (python, system) in found]
+        written += [python] if len(systems) == len(SYSTEMS) else [f"{python}:{system}" for system in systems]
+    return written
 
 
 def main() -> None:
     """Resolve for every system and Python, and write the file."""
-    checksums: dict[tuple[str, str], set[str]] = defaultdict(set)
-    pythons: dict[tuple[str, str], set[str]] = defaultdict(set)
+    checksums: dict[str, set[str]] = defaultdict(set)
+    there: dict[str, set[tuple[str, str]]] = defaultdict(set)
     for python in PYTHONS:
-        for system, tags in SYSTEMS.items():
-            print(f"Python {python}, {system}", file=sys.stderr)
-            for package, checksum in resolve(python, tags).items():
-                if package[0] not in NOT_LOCKED:
-                    checksums[package].add(checksum)
-                    pythons[package].add(python)
+        for system in SYSTEMS:
+            for requirements in (REQUIREMENTS, OPTIONAL):
+                for package, known in resolve(python, system, requirements).items():
+                    if package.split("==")[0] not in NOT_LOCKED:
+                        checksums[package] |= known
+                        there[package].add((python, system))
     lines = [
-        f"{name}=={version} {','.join(sorted(pythons[name, version], key=PYTHONS.index))} "
-        + " ".join(f"sha256:{checksum}" for checksum in sorted(checksums[name, version]))
-        for name, version in sorted(checksums)
+        f"{package} {','.join(places(there[package]))} {' '.join(sorted(checksums[package]))}"
+        for package in sorted(checksums)
     ]
     LOCKED.write_text(HEAD + "\n".join(lines) + "\n", encoding="ascii")
 

@@ -14,15 +14,14 @@ from ..parameters import AirborneParameters
 from ..polyline import Polyline
 from ..progress import Progress
 from ..run.tasks import Context, Task
-from ..squares.store import counts_of, files_of, read_stored
 from ..standards import STANDARDS
-from .axis import axis_of_guide
+from ..tiles.grid import Key
+from ..tiles.store import counts_of, files_of, read_stored
+from .cross_sections import STATION_M
 from .fitting import EMPTY, SEEN, Fitted, Stations, fit_tracks
+from .guide_line import axis_of_guide
+from .reading import POINT, Piece, Run, density_of, pieces_by_square, spool
 from .remarks import FLIGHT, are_hints, on_density, on_gauges, on_shapes, refuse_mobile
-from .run import Run
-from .sections import STATION_M
-from .spooling import POINT, density_of, spool
-from .squares import Key, Piece, pieces_by_square
 from .survey import AirborneTrack, Guide, Survey, joined_others, lines_of, track_of
 
 FIT_S = 2e-5

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,15 +10,12 @@ from scipy.spatial import cKDTree
 
 from ..polyline import Polyline
 from ..progress import SILENT, Progress
-from .axis import Points
-from .beside import LONG, WIDE_M, Beside, look_beside
-from .corridor import gather
-from .course import Course, Evidence, evidence
-from .joint import certainty, courses, groups
-from .refinement import Refined, Traced, refine
+from .cross_sections import EDGE_M, STATION_M
+from .guide_line import SECTION_M, Points, gather
 from .ridges import HALF_M, Shape
-from .sections import STATION_M
-from .strips import strip_error
+from .rivals import LONG, TRACKS_APART_M, WIDE_M, Beside, look_beside
+from .rounds import REACHES_M, Refined, Traced, refine, strip_error
+from .search import Course, Evidence, certainty, courses, evidence, groups, slopes
 
 LONG_GAIN, LONG_SHARE = 7.0, 0.25
 """Gain that two rails must have over 70 m, and the share of the expected gain: roads, hedges and ditches stay below."""
@@ -44,8 +41,8 @@ SURE = 0.9
 MARGIN = 3.0
 """Least score of the course above that of one elsewhere."""
 
-TWIN_M, GUIDES_APART_M = 0.4, 2.8
-"""Two results this close, where their guides are this far apart, are one track with two guides."""
+TWIN_M = 0.4
+"""Two results this close, where their guides are `TRACKS_APART_M` apart, are one track with two guides."""
 
 SWITCH_M, TOE_M, TOE_FACTOR = 3.0, 0.5, 2.0
 """Two results this close are those of a switch; this close, both pull each other, and the standard error grows by this
@@ -67,9 +64,6 @@ FEW_POINTS = 8
 
 MAX_SIGMA_M = 0.05
 """Standard error above which a station is not seen: of those below, 95 % lie within 10 cm."""
-
-TURNED_M = 0.15
-"""What a section of 5 m reaches farther to the side where the guide's direction is off most."""
 
 REASONS = (
     "",
@@ -173,7 +167,7 @@ def fit_tracks(
     found: list[tuple[int, Evidence]] = []
     for number, axis in looking.follow(list(enumerate(axes)), len(axes)):
         near.append(Points.near(axis, xyz, strip, reach_m + WIDE_M + HALF_M))
-        corridor = gather(near[number], axis, reach_m + HALF_M + TURNED_M)
+        corridor = gather(near[number], axis, reach_m + HALF_M + slopes()[-1] * SECTION_M / 2)
         if corridor is not None:
             found.append((number, evidence(corridor, reach_m, shapes[number])))
     numbers = [number for number, _ in found]
@@ -208,20 +202,19 @@ class _Line:
 
 def _judged(axes: Sequence[Polyline], lines: dict[int, _Line], footprint_m: float) -> list[Fitted]:
     """Judge every station of every line, also by the other lines."""
-    places = {number: line.refined.curve.xy for number, line in lines.items()}
     judged = []
     for number, axis in enumerate(axes):
         if number not in lines:
             judged.append(_nothing(axis))
             continue
         line, refined = lines[number], lines[number].refined
-        distance, apart = _others(number, axes, places)
+        distance, apart = _others(number, axes, lines)
         toe = np.where(distance < TOE_M, TOE_FACTOR, 1.0)
         blur = FOOTPRINT_SHARE * footprint_m
         sigma = toe * np.sqrt((SHARED * refined.curve.sigma) ** 2 + blur**2 + strip_error(refined) ** 2)
         reason = _reasons(line, distance < SWITCH_M)
         reason[(reason == SEEN) & (sigma > toe * MAX_SIGMA_M)] = SPARSE
-        reason[(reason == SEEN) & (distance < TWIN_M) & (apart > GUIDES_APART_M)] = TWIN
+        reason[(reason == SEEN) & (distance < TWIN_M) & (apart > TRACKS_APART_M)] = TWIN
         stations = Stations(
             refined.t,
             refined.curve.xy,
@@ -233,7 +226,7 @@ def _judged(axes: Sequence[Polyline], lines: dict[int, _Line], footprint_m: floa
             reason,
             distance < SWITCH_M,
         )
-        judged.append(Fitted(stations, refined.seen.shape, refined.seen.shown_m, _unclaimed(number, lines, places)))
+        judged.append(Fitted(stations, refined.seen.shape, refined.seen.shown_m, _unclaimed(number, lines)))
     return judged
 
 
@@ -253,7 +246,7 @@ def _reasons(line: _Line, switch: np.ndarray) -> np.ndarray:
     refined, sections = line.refined, line.refined.seen.sections
     most = sections.found.most
     own = sections.found.both > np.minimum(OWN_GAIN, most - CHANCE * np.sqrt(2 * most))
-    own &= np.abs(sections.offset) < REACH_M
+    own &= np.abs(sections.offset) < REACHES_M[-1] - EDGE_M
     shown, flat = _over_70_m(line.beside, switch) if line.beside is not None else (own, own)
     flat &= refined.seen.shape.width_m < WIDEST_M
     half = np.minimum(np.arange(len(own)) * 2, len(line.sure) - 1)
@@ -299,21 +292,17 @@ def _off_level(refined: Refined) -> np.ndarray:
 
 
 VERTEX_M = 0.1
-"""Distance between the vertices of a line from which distances are measured."""
+"""Distance between the places on a line from which distances are measured."""
 
 
-REACH_M = 0.24
-"""A section whose rails lie at the end of the last search shows none."""
-
-
-def _others(number: int, axes: Sequence[Polyline], places: dict[int, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+def _others(number: int, axes: Sequence[Polyline], lines: dict[int, _Line]) -> tuple[np.ndarray, np.ndarray]:
     """Return the distance of each station from the nearest other line, and how far apart their guides are there."""
-    own = places[number]
+    own = lines[number].refined.curve.xy
     distance, apart = np.full(len(own), np.inf), np.full(len(own), np.inf)
-    for other, xy in places.items():
+    for other, line in lines.items():
         if other == number:
             continue
-        away = cKDTree(_dense(xy)).query(own)[0]
+        away = _places([line]).query(own)[0]
         guides = cKDTree(axes[other].xy).query(axes[number].xy)[0]
         at = np.linspace(0, len(guides) - 1, len(own)).round().astype(np.int64)
         nearer = away < distance
@@ -321,11 +310,9 @@ def _others(number: int, axes: Sequence[Polyline], places: dict[int, np.ndarray]
     return distance, apart
 
 
-def _dense(xy: np.ndarray) -> np.ndarray:
-    """Return a line with vertices every `VERTEX_M`, so that the nearest one is hardly farther than the line."""
-    steps = int(round(STATION_M / VERTEX_M))
-    at = np.arange(0, (len(xy) - 1) * steps + 1) / steps
-    return np.column_stack([np.interp(at, np.arange(len(xy)), column) for column in xy.T])
+def _places(lines: Iterable[_Line]) -> cKDTree:
+    """Return the places on lines, from which distances are measured."""
+    return cKDTree(np.concatenate([Polyline(line.refined.curve.xy).resampled(VERTEX_M).xy for line in lines]))
 
 
 OTHER_SHARE, OTHER_GAIN, CLAIMED_M = 0.5, 10.0, 1.2
@@ -333,18 +320,18 @@ OTHER_SHARE, OTHER_GAIN, CLAIMED_M = 0.5, 10.0, 1.2
 a line passes this close."""
 
 
-def _unclaimed(number: int, lines: dict[int, _Line], places: dict[int, np.ndarray]) -> np.ndarray:
+def _unclaimed(number: int, lines: dict[int, _Line]) -> np.ndarray:
     """Return chainages and distances of places beside a line that look like tracks without a guide, (k, 2)."""
     line = lines[number]
     if line.beside is None:
         return np.empty((0, 2))
-    known = cKDTree(np.concatenate([_dense(xy) for xy in places.values()]))
+    known = _places(lines.values())
     gain, flaw, _ = line.beside.on
     found = []
     for section in range(min(LONG // 2, len(gain) - 1), len(gain), LONG):
         t, own, score = float(line.refined.t[section]), gain[section] - flaw[section], line.beside.score[section]
         for side in (-1, 1):
-            there = np.where(side * line.beside.across > GUIDES_APART_M, score, -np.inf)
+            there = np.where(side * line.beside.across > TRACKS_APART_M, score, -np.inf)
             best = int(there.argmax())
             at, across = np.array([t]), line.beside.across[best]
             place = line.refined.line.at(at) + across * line.refined.line.left_at(at)

@@ -1,232 +1,274 @@
-"""Places that look like tracks in a cloud without guides: each tile is searched in all directions for two ridges.
+"""Where beside its guide each track runs: the places that most evidence supports, found by dynamic programming.
 
-The heights of a tile above the ground, seen along a direction, make a profile; two ridges at the distance of the rails
-that explain it better than a level bed are a find, which is then checked as sections along guides are (`ridges`).
+Parallel guides share most of their error, so each supports its neighbours.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
-from scipy.ndimage import distance_transform_edt, map_coordinates, median_filter
+from scipy.spatial import cKDTree
 
-from ..progress import SILENT, Progress
+from ..polyline import Polyline
+from .guide_line import SECTION_M, Corridor
 from .ridges import HALF_M, Shape, binned, fit, windows
-from .squares import ROW
 
-CELL_M, AROUND_CELLS = 1.0, 5
-"""Cells whose mean height states the ground, and the cells along a side whose median smooths it: a track bed is wider
-than half of them, and rails and kerbs are not."""
+STEP_M, SLOPE_STEP, SLOPES = 0.05, 0.02, 7
+"""Distance between the places that are tried, and the directions of the guide's errors: their step and number."""
 
-OFF_GROUND_M = 0.35
-"""Points farther from the ground than this are plants, cars, wires and walls."""
+BLOCK = 24
+"""Sections that are fitted at once, which limits the memory to about 100 MB."""
 
-TILE_M, STEP_M = 20.0, 10.0
-"""Side of a tile, and the distance to the next one where the surroundings of a find are searched."""
+LEAST = -6.0
+"""Least evidence of a section, so that none decides alone; it is that of a place out of reach."""
 
-FEW_POINTS, MOST_POINTS = 60, 4000
-"""Points in a tile below which it shows nothing, and above which every second, third, ... is enough."""
+SATURATION, ALWAYS = 0.2, 1.0
+"""Share of the gain of expected rails up to which evidence counts, and a gain that always does: two real tracks must
+tie, so that the guide decides between them."""
 
-DIRECTIONS = 240
-"""Directions that are tried: over half a tile, half a step is 7 cm, the width of a ridge."""
+STEP_COST, TURN_COST = 0.5, 1.0
+"""Cost of a place that differs by one step from where the direction leads, and of a turn by one step of direction."""
 
-BIN_M, REACH_M = 0.1, 15.0
-"""Width of the bins across, and half that of a profile: half the diagonal of a tile and of a bed."""
+GUIDE_M, GUIDE_LENGTH_M = 1.2, 20.0
+"""Standard deviation of a guide, and the length over which its error is a new one."""
 
-WINDOW_POINTS = 30
-"""Points on a bed below which two ridges are chance."""
+APART_M = 0.5
+"""Distance beyond which another place is a different answer."""
 
-LOWEST_M, HIGHEST_M, ROUGHEST_M = 0.015, 0.16, 0.08
-"""Heights of ridges between which they may be rails, and the standard deviation about them up to which it is a bed."""
+IMPOSSIBLE = -1e9
+"""Score of a place where no course runs: below every sum of scores."""
 
-LIKELY, FINDS = 10.0, 4
-"""Log-likelihood of two ridges above a level bed that makes a find, which open ground does not reach, and the number of
-finds in a tile, one for each track."""
 
-ASIDE_M, TURNED_RAD = 1.0, 0.15
-"""Finds closer than this, and turned by less, are the same."""
+FAR_M, NEAR_M, PARALLEL = 13.0, 2.5, 0.995
+"""Guides this far apart at most, and this far at least, are those of one line where the cosine of their angle is
+larger."""
 
-CHECK_BIN_M, CHECK_M = 0.05, 0.25
-"""Width of the bins in which a find is checked, and how far to the sides."""
+OWN_M = 0.5
+"""Standard deviation of a guide's own error beside that of its line."""
 
-RIVALS_M, RIVAL_SHARE = (0.4, 1.1), 0.6
-"""Distances at which another place excludes a find, if it has this share of its score: furrows of a field repeat."""
+OWN_LENGTH_M, SMOOTHED_SECTIONS = 50.0, 7
+"""Length over which this error is a new one, and the sections over which the joint course is averaged."""
 
-CHECKED = 4.0
-"""Gain of both rails, less the flaws of their bed, that a find must have over a tile."""
+MOST_TOGETHER = 8
+"""Tracks whose curves are drawn together: the run time grows with the third power of their number."""
+
+RIVAL_SHARE, RIVAL_SECTIONS, SAME_M = 0.8, 9, 0.2
+"""Another track is at least `NEAR_M` away and has this share of the score over as many sections; places this close are
+the same."""
 
 
 @dataclass(frozen=True)
-class Finds:
-    """Places that look like tracks.
+class Evidence:
+    """How well places beside a guide show a track.
 
     Attributes
     ----------
-    xy : (n, 2) array
-        Middle of the track next to the middle of its tile, metres.
-    direction : (n,) array
-        Radians from east, 0 to pi.
-    score : (n,) array
-        Gain of both rails, less the flaws of their bed.
+    across : (c,) array
+        Distances of the places to the left of the guide, every `STEP_M`.
+    score : (sections, SLOPES, c) array
     """
 
-    xy: np.ndarray
-    direction: np.ndarray
+    across: np.ndarray
     score: np.ndarray
 
-    @classmethod
-    def joined(cls, rows: list[tuple[float, float, float, float]]) -> Finds:
-        """Return rows of x, y, direction and score as columns."""
-        table = np.array(rows, dtype=float).reshape(-1, 4)
-        return cls(table[:, :2], table[:, 2], table[:, 3])
+    @property
+    def best(self) -> np.ndarray:
+        """Score of each place in its best direction, (sections, c)."""
+        return self.score.max(axis=1)
 
 
-def search(
-    xyz: np.ndarray, first: np.ndarray, side_m: float, shape: Shape, progress: Progress = SILENT
-) -> list[tuple[float, float, float, float]]:
-    """Search a square for tracks.
+@dataclass(frozen=True)
+class Course:
+    """A course beside a guide.
 
-    Parameters
+    Attributes
     ----------
-    xyz : (n, 3) array
-        Points in the square and within `TILE_M` around it, metres.
-    first : (2,) array
-        Its corner with the smallest coordinates, multiples of `TILE_M`.
-    shape : Shape
-        Ridges as they are expected.
+    across : (sections,) array
+        Distance to the left of the guide in the middle of each section of `SECTION_M`.
+    margin : (sections,) array
+        Score of this course above that of the best one that is elsewhere in the section.
+    """
+
+    across: np.ndarray
+    margin: np.ndarray
+
+
+def slopes() -> np.ndarray:
+    """Return the directions that are tried, metres to the left per metre along the guide."""
+    return (np.arange(SLOPES) - SLOPES // 2) * SLOPE_STEP
+
+
+def evidence(corridor: Corridor, reach_m: float, shape: Shape) -> Evidence:
+    """Weigh every place within reach of the axis in every section."""
+    half, places = int(round(HALF_M / STEP_M)), 2 * int(round(reach_m / STEP_M)) + 1
+    width = 2 * half + 1
+    bins = places + width - 1
+    low_m = -(places // 2 + half + 0.5) * STEP_M
+    section = np.floor((corridor.t - corridor.start_m) / SECTION_M).astype(np.int64)
+    ahead = corridor.t - corridor.start_m - (section + 0.5) * SECTION_M
+    tables = [
+        binned(section, corridor.across - slope * ahead, corridor.height, corridor.sections, low_m, bins, STEP_M)
+        for slope in slopes()
+    ]
+    count, height = (np.stack(one, axis=1) for one in zip(*tables))
+    u = (np.arange(width) - half) * STEP_M
+    score = np.empty((corridor.sections, SLOPES, places), np.float32)
+    for first in range(0, corridor.sections, BLOCK):
+        block = slice(first, first + BLOCK)
+        found = fit(windows(count[block], width), windows(height[block], width), u, shape)
+        gain = np.minimum(found.gain, SATURATION * found.most + ALWAYS) - found.flaw
+        score[block] = np.maximum(gain, LEAST)
+    return Evidence((np.arange(places) - places // 2) * STEP_M, score)
+
+
+def guide_prior(across: np.ndarray, sections: int) -> np.ndarray:
+    """Return what a guide says about places beside it, (sections, c)."""
+    return np.tile(-0.5 * (across / GUIDE_M) ** 2 * SECTION_M / GUIDE_LENGTH_M, (sections, 1))
+
+
+def trace(found: Evidence, prior: np.ndarray) -> Course:
+    """Find the course with the largest sum of evidence and prior, (sections, c), less the cost of its turns."""
+    score = found.score + prior[:, None, :]
+    ahead, back = _Move(len(found.across), 1), _Move(len(found.across), -1)
+    best, choices = [score[0]], []
+    for section in score[1:]:
+        reached, choice = ahead(best[-1])
+        best.append(reached + section)
+        choices.append(choice)
+    rest = [np.zeros_like(score[0])]
+    for section in score[:0:-1]:
+        rest.append(back(rest[-1] + section)[0])
+    state = int(np.argmax(best[-1]))
+    states = [state]
+    for choice in reversed(choices):
+        state = int(choice.ravel()[state])
+        states.append(state)
+    across = found.across[np.array(states[::-1]) % len(found.across)]
+    marginal = np.array([(one + other).max(axis=0) for one, other in zip(best, rest[::-1])])
+    elsewhere = np.where(np.abs(found.across - across[:, None]) > APART_M, marginal, IMPOSSIBLE).max(axis=1)
+    return Course(across, marginal.max(axis=1) - elsewhere)
+
+
+class _Move:
+    """The step from a section to the next one, or to the one before: best predecessor of each direction and place."""
+
+    def __init__(self, places: int, direction: int) -> None:
+        lean = np.arange(SLOPES) - SLOPES // 2
+        per_slope = int(round(SECTION_M * SLOPE_STEP / 2 / STEP_M))
+        moved = direction * per_slope * (lean[:, None] + lean)
+        place = np.arange(places)
+        source = place - moved[:, :, None]
+        self._inside = (source >= 0) & (source < places)
+        self._source = np.where(self._inside, source, 0) + np.arange(SLOPES)[None, :, None] * places
+        self._cost = (TURN_COST * np.abs(lean[:, None] - lean))[:, :, None]
+        self._places = places
+
+    def __call__(self, score: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the best score of each state, (SLOPES, places), and the state from which it comes."""
+        beside = np.pad(score, ((0, 0), (1, 1)), constant_values=IMPOSSIBLE)
+        near = np.stack([beside[:, :-2] - STEP_COST, score, beside[:, 2:] - STEP_COST])
+        aside = near.argmax(axis=0)
+        wide = np.take_along_axis(near, aside[None], axis=0)[0]
+        reached = np.where(self._inside, wide.ravel()[self._source], IMPOSSIBLE) - self._cost
+        lean = reached.argmax(axis=1)
+        found = np.take_along_axis(reached, lean[:, None], axis=1)[:, 0]
+        source = np.take_along_axis(self._source, lean[:, None], axis=1)[:, 0]
+        return found, source + aside.ravel()[source] - 1
+
+
+def courses(axes: Sequence[Polyline], found: Sequence[Evidence]) -> tuple[list[Course], list[np.ndarray]]:
+    """Find the courses of parallel tracks.
 
     Returns
     -------
-    list of (x, y, direction, score)
+    list of Course
+    list of (sections, c) arrays
+        Score of each place together with that of the neighbours, for `certainty`.
     """
-    near = _above_ground(xyz)
-    tiles = _Tiles(near, first - TILE_M)
-    count = int(round(side_m / STEP_M))
-    grid = [(i, j) for i in range(2, count + 2, 2) for j in range(2, count + 2, 2)]
-    found: dict[tuple[int, int], list[tuple[float, float, float, float]]] = {}
-    for place in progress.follow(grid, len(grid)):
-        found[place] = tiles.finds(place, shape)
-    likely = {(i + a, j + b) for (i, j), rows in found.items() if rows for a in (-1, 0, 1) for b in (-1, 0, 1)}
-    for place in sorted(likely - found.keys()):
-        progress.check()
-        found[place] = tiles.finds(place, shape)
-    return [row for place in sorted(found) for row in found[place]]
+    together = [one.best + _support(number, axes, found) for number, one in enumerate(found)]
+    joined = []
+    for one, score in zip(found, together):
+        shared = Evidence(one.across, one.score + (score - one.best)[:, None, :])
+        course = trace(shared, guide_prior(one.across, len(score)))
+        padded = np.pad(course.across, SMOOTHED_SECTIONS // 2, mode="edge")
+        middle = np.convolve(padded, np.ones(SMOOTHED_SECTIONS) / SMOOTHED_SECTIONS, "valid")
+        prior = -0.5 * ((one.across - middle[:, None]) / OWN_M) ** 2 * SECTION_M / OWN_LENGTH_M
+        joined.append(trace(one, prior))
+    return joined, together
 
 
-def _above_ground(xyz: np.ndarray) -> np.ndarray:
-    """Return the points near the ground with their heights above it, (k, 3)."""
-    low = np.floor(xyz[:, :2].min(axis=0) / CELL_M) * CELL_M
-    at = (xyz[:, :2] - low) / CELL_M
-    shape = tuple((np.floor(at.max(axis=0)).astype(int) + 1).tolist())
-    cell = np.ravel_multi_index(tuple(np.floor(at).astype(np.int64).T), shape)
-    count = np.bincount(cell, minlength=shape[0] * shape[1]).reshape(shape)
-    total = np.bincount(cell, xyz[:, 2], minlength=shape[0] * shape[1]).reshape(shape)
-    nearest = distance_transform_edt(count == 0, return_distances=False, return_indices=True)
-    ground = median_filter((total / np.maximum(count, 1))[tuple(nearest)], AROUND_CELLS, mode="nearest")
-    height = xyz[:, 2] - map_coordinates(ground, at.T - 0.5, order=1, mode="nearest")
-    near = np.abs(height) < OFF_GROUND_M
-    return np.column_stack([xyz[near, :2], height[near]])
+def groups(axes: Sequence[Polyline]) -> list[list[int]]:
+    """Return the numbers of the guides whose curves are drawn together: parallel ones, `MOST_TOGETHER` at most."""
+    found: list[list[int]] = []
+    for number, axis in enumerate(axes):
+        for group in found:
+            if len(group) < MOST_TOGETHER and any(parallel(axis.xy, axis.normals, axes[one])[0].any() for one in group):
+                group.append(number)
+                break
+        else:
+            found.append([number])
+    return found
 
 
-class _Tiles:
-    """Points sorted into cells of `STEP_M`, of which two by two make a tile."""
-
-    def __init__(self, xyh: np.ndarray, corner: np.ndarray) -> None:
-        cell = np.floor((xyh[:, :2] - corner) / STEP_M).astype(np.int64)
-        key = cell[:, 0] * ROW + cell[:, 1]
-        order = np.argsort(key, kind="stable")
-        self._points, self._key, self._corner = xyh[order], key[order], corner
-
-    def finds(self, place: tuple[int, int], shape: Shape) -> list[tuple[float, float, float, float]]:
-        """Search the tile with this first cell."""
-        points = np.concatenate([self._cell(place[0] + i, place[1] + j) for i in (0, 1) for j in (0, 1)])
-        if len(points) < FEW_POINTS:
-            return []
-        points = points[:: -(-len(points) // MOST_POINTS)]
-        middle = self._corner + (np.array(place) + 1) * STEP_M
-        local = points - [*middle, 0.0]
-        rows = []
-        for direction, left in _likely(local, shape):
-            score, moved = _check(local, direction, left, shape)
-            if score > CHECKED:
-                x, y = middle + moved * np.array([-np.sin(direction), np.cos(direction)])
-                rows.append((float(x), float(y), direction, score))
-        return rows
-
-    def _cell(self, i: int, j: int) -> np.ndarray:
-        first, last = np.searchsorted(self._key, [i * ROW + j, i * ROW + j + 1])
-        return self._points[first:last]
+def _support(number: int, axes: Sequence[Polyline], found: Sequence[Evidence]) -> np.ndarray:
+    """Return what the neighbours of a guide say about places beside it, (sections, c)."""
+    own, sections = axes[number], len(found[number].score)
+    t = own.t[0] + (np.arange(sections) + 0.5) * SECTION_M
+    place, normal = own.at(t), own.left_at(t)
+    support = np.zeros((sections, len(found[number].across)))
+    for other, evidence in enumerate(found):
+        if other == number:
+            continue
+        near, t, opposite = parallel(place, normal, axes[other])
+        section = ((t - axes[other].t[0]) / SECTION_M).astype(np.int64)
+        score = evidence.best[np.clip(section, 0, len(evidence.score) - 1)]
+        score = np.where(opposite[:, None], score[:, ::-1], score)
+        support += np.where(near[:, None], _blurred(score), 0.0)
+    return support
 
 
-def _likely(local: np.ndarray, shape: Shape) -> Iterator[tuple[float, float]]:
-    """Yield directions and distances to the left of the middle of a tile at which two ridges are likely."""
-    score = _scores(local, shape.spacing_m, shape.width_m)
-    places = (np.arange(score.shape[1]) - score.shape[1] // 2) * BIN_M
-    for _ in range(FINDS):
-        row, column = np.unravel_index(int(score.argmax()), score.shape)
-        if score[row, column] < LIKELY:
-            return
-        yield float(_directions()[row]), float(places[column])
-        turned = np.abs(np.arange(DIRECTIONS) - row)
-        turned = np.minimum(turned, DIRECTIONS - turned) * np.pi / DIRECTIONS
-        mirrored = np.where(np.abs(np.arange(DIRECTIONS) - row) > DIRECTIONS / 2, -1, 1)
-        close = np.abs(places - mirrored[:, None] * places[column]) < ASIDE_M
-        score = np.where((turned < TURNED_RAD)[:, None] & close, 0.0, score)
+def parallel(place: np.ndarray, normal: np.ndarray, other: Polyline) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return beside which places, (n, 2), with unit vectors to the left, (n, 2), another line is parallel.
+
+    Returns
+    -------
+    parallel : (n,) bool array
+    t : (n,) array
+        Chainage of the other line there.
+    opposite : (n,) bool array
+        Whether it runs the other way.
+    """
+    distance, nearest = cKDTree(other.xy).query(place, distance_upper_bound=FAR_M)
+    near = np.isfinite(distance)
+    nearest = np.where(near, nearest, 0)
+    cosine = (normal * other.normals[nearest]).sum(axis=1)
+    near &= (np.abs(cosine) > PARALLEL) & (distance > NEAR_M)
+    return near, other.t[nearest], cosine < 0
 
 
-@lru_cache(maxsize=1)
-def _directions() -> np.ndarray:
-    return np.arange(DIRECTIONS) * np.pi / DIRECTIONS
+def _blurred(score: np.ndarray) -> np.ndarray:
+    """Return the best score at a similar place, less the cost of the difference."""
+    aside = int(round(2 * OWN_M / STEP_M))
+    step = np.arange(-aside, aside + 1) * STEP_M
+    padded = np.pad(score, ((0, 0), (aside, aside)), constant_values=LEAST)
+    return (windows(padded, 2 * aside + 1) - 0.5 * (step / OWN_M) ** 2).max(axis=-1)
 
 
-@lru_cache(maxsize=4)
-def _kernels(spacing_m: float, width_m: float) -> np.ndarray:
-    """Return what sums the bins of a profile about each place: all, by the ridges' height, and by its square."""
-    bins, places = int(round(2 * REACH_M / BIN_M)), int(round(TILE_M / BIN_M)) + 1
-    u = (np.arange(bins) + 0.5) * BIN_M - REACH_M
-    u = u[:, None] - (np.arange(places) - places // 2) * BIN_M
-    bed = np.abs(u) < HALF_M
-    ridges = bed * np.exp(-0.5 * ((np.abs(u) - spacing_m / 2) / width_m) ** 2)
-    return np.stack([bed.astype(float), ridges, ridges**2]).astype(np.float32)
+def certainty(course: Course, score: np.ndarray, across: np.ndarray) -> np.ndarray:
+    """Return how likely the guide means this track and not another one within reach, (sections,).
 
-
-def _scores(local: np.ndarray, spacing_m: float, width_m: float) -> np.ndarray:
-    """Return the log-likelihood of two ridges above that of a level bed, (DIRECTIONS, places)."""
-    directions = _directions()
-    across = local[:, 1:2] * np.cos(directions) - local[:, :1] * np.sin(directions)
-    bins = int(round(2 * REACH_M / BIN_M))
-    column = ((across + REACH_M) / BIN_M).astype(np.int32) + np.arange(DIRECTIONS, dtype=np.int32) * bins
-    height = np.repeat(local[:, 2], DIRECTIONS)
-    count, total, squares = (
-        np.bincount(column.ravel(), weight, DIRECTIONS * bins).reshape(DIRECTIONS, bins).astype(np.float32)
-        for weight in (None, height, height**2)
-    )
-    bed, ridges, ridges_squared = _kernels(spacing_m, width_m)
-    number = np.maximum(count @ bed, 1.0)
-    mean, expected = total @ bed / number, count @ ridges / number
-    spread = np.maximum(count @ ridges_squared - number * expected**2, 1e-3)
-    shared = total @ ridges - number * mean * expected
-    level = np.maximum(squares @ bed - number * mean**2, 1e-6)
-    height_m = shared / spread
-    rest = np.maximum(level - height_m * shared, 1e-6)
-    fits = (number > WINDOW_POINTS) & (height_m > LOWEST_M) & (height_m < HIGHEST_M)
-    return np.where(fits & (rest < number * ROUGHEST_M**2), 0.5 * number * np.log(level / rest), 0.0)
-
-
-def _check(local: np.ndarray, direction: float, left_m: float, shape: Shape) -> tuple[float, float]:
-    """Return the score of a place with all checks of two rails on a bed, and where to the left it is best."""
-    across = local[:, 1] * np.cos(direction) - local[:, 0] * np.sin(direction) - left_m
-    half, aside = int(round(HALF_M / CHECK_BIN_M)), int(round(RIVALS_M[1] / CHECK_BIN_M))
-    bins, low_m = 2 * (half + aside) + 1, -(half + aside + 0.5) * CHECK_BIN_M
-    section = np.zeros(len(across), dtype=np.int64)
-    count, height = binned(section, across, local[:, 2], 1, low_m, bins, CHECK_BIN_M)
-    u = (np.arange(2 * half + 1) - half) * CHECK_BIN_M
-    found = fit(windows(count, len(u)), windows(height, len(u)), u, shape, passes=3)
-    score, place = (found.gain - found.flaw)[0], (np.arange(2 * aside + 1) - aside) * CHECK_BIN_M
-    best = int(np.where(np.abs(place) <= CHECK_M, score, -np.inf).argmax())
-    apart = np.abs(place - place[best])
-    rival = score[(apart > RIVALS_M[0]) & (apart < RIVALS_M[1])].max()
-    return float(score[best]) if rival < RIVAL_SHARE * score[best] else 0.0, left_m + float(place[best])
+    Parameters
+    ----------
+    score : (sections, c) array
+        Together with the neighbours.
+    across : (c,) array
+    """
+    kernel = np.ones(min(RIVAL_SECTIONS, len(score)))
+    mean = np.column_stack([np.convolve(one, kernel / len(kernel), "same") for one in score.T])
+    apart = np.abs(across - course.across[:, None])
+    own = np.where(apart < SAME_M, mean, 0.1).max(axis=1)
+    rival = (apart > NEAR_M) & (mean > RIVAL_SHARE * own[:, None])
+    nearest = np.where(rival, np.abs(across), np.inf).min(axis=1)
+    return 1 / (1 + np.exp(-(np.minimum(nearest, 10.0) ** 2 - course.across**2) / (2 * GUIDE_M**2)))

@@ -11,8 +11,8 @@ from scipy.interpolate import CubicSpline
 from ..frame import LocalFrame
 from ..polyline import length_along
 from ..standards import GAUGE_RANGE_MM
+from .cross_sections import STATION_M
 from .fitting import BED_SIGMA_M, REASONS, SEEN, Stations
-from .sections import STATION_M
 
 MAX_UNSEEN_M, LEAST_STATIONS = 30.0, 3
 """A line ends where its track is not seen for longer, and is none with fewer stations that are."""
@@ -108,7 +108,6 @@ class AirborneTrack:
     margin : (n,) array
     reason : tuple of str
         Why a station is not seen; empty where it is.
-    others : tuple of OtherTrack
     """
 
     guide: Guide
@@ -173,10 +172,8 @@ class Survey:
     ----------
     tracks : tuple of AirborneTrack
         One for each guide.
-    lines : tuple of AirborneLine
     density : float
         Points per square metre along the guides.
-    warnings : tuple of str
     """
 
     tracks: tuple[AirborneTrack, ...]
@@ -264,7 +261,6 @@ def lines_of(
 
     Parameters
     ----------
-    tracks : sequence of AirborneTrack
     gauge_mm : float
         That of the run, for guides that state none.
     hints : bool

@@ -151,7 +151,6 @@ class Span:
     ----------
     start, end : float
         Distances, metres.
-    is_ramp : bool
     curved : bool
         Whether the bend of a part is free.
     bend : float
@@ -196,15 +195,7 @@ def assembled(spans: Sequence[Span], order: int) -> Chain:
 
 
 def columns(chain: Chain, samples: Samples) -> tuple[np.ndarray, np.ndarray]:
-    """Return the columns of the model.
-
-    Returns
-    -------
-    base : (n, order + m) array
-        Of offset, slope and the bends of all parts.
-    by : (n, 2 m - 2) array
-        Derivatives of G by the ends of each joint: p and q of the first, of the second, and so on.
-    """
+    """Return the columns of offset, slope and bends, (n, order + m), and of the ends of all joints, (n, 2 m - 2)."""
     count = len(chain.bends)
     x = (samples.s - chain.start)[:, None]
     d = np.maximum(chain.q - chain.p, JUMP_M)
@@ -283,20 +274,10 @@ class Unknowns:
 
 
 def fitted(chain: Chain, samples: Samples, least_m: float, steps: int, held: Held = NOTHING) -> tuple[Chain, float]:
-    """Fit bends and joints by Gauss-Newton steps; return the best chain and its weighted sum of squared residuals.
+    """Fit what is not held by Gauss-Newton steps; return the best chain and its weighted sum of squared residuals.
 
-    A chain that has as many parameters as there are samples, or more, stays as it is; its sum is infinite.
-
-    Parameters
-    ----------
-    chain : Chain
-    samples : Samples
-    least_m : float
-        Least length of a part or a ramp, metres.
-    steps : int
-        Largest number of steps.
-    held : Held
-        Bends and starts of parts that stay as they are.
+    Parts and ramps keep at least the least length. A chain that has as many parameters as there are samples, or more,
+    stays as it is; its sum is infinite.
     """
     best, best_rss = chain, np.inf
     if len(samples.s) <= chain.size:

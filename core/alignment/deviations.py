@@ -12,8 +12,8 @@ from ..errors import RailExtractError
 from ..polyline import Polyline
 from ..progress import Progress
 from .elements import Alignment
-from .equations import SAME_PLACE_M
 from .measured import Track
+from .stations import SAME_PLACE_M
 
 BESIDE_M = 2.0
 """Largest median distance of a track from its alignment, metres: that of its neighbour is at least 3.4 m away."""
@@ -25,7 +25,6 @@ class Deviations:
 
     Attributes
     ----------
-    track_id : int or None
     s : (n,) array
         Distance along the design, metres.
     xyz : (n, 3) array
@@ -43,14 +42,7 @@ class Deviations:
 
 
 def beside(alignments: Sequence[Alignment], xy: np.ndarray) -> Optional[Alignment]:
-    """Return the alignment along which a line lies; None if it lies along none.
-
-    Parameters
-    ----------
-    alignments : sequence of Alignment
-    xy : (n, 2) array
-        Vertices of the line, local metres of the alignments.
-    """
+    """Return the alignment along which a line with vertices, (n, 2) local metres, lies; None if it lies along none."""
     distances = [(_distance_m(alignment, xy), number) for number, alignment in enumerate(alignments)]
     nearest_m, number = min(distances, default=(np.inf, 0))
     return alignments[number] if nearest_m <= BESIDE_M else None
@@ -66,20 +58,12 @@ def _distance_m(alignment: Alignment, xy: np.ndarray) -> float:
 def compared_with(
     alignments: Sequence[Alignment], tracks: Sequence[Track], progress: Progress
 ) -> list[tuple[Alignment, Deviations]]:
-    """Return the deviations of each track, with the alignment beside it.
-
-    Parameters
-    ----------
-    alignments : sequence of Alignment
-    tracks : sequence of Track
-        In the frame of the alignments.
-    progress : Progress
-        Warned of tracks that lie along no alignment.
+    """Return the deviations of each track, in the frame of the alignments, with the alignment beside it.
 
     Raises
     ------
     RailExtractError
-        None lies along an alignment.
+        None lies along an alignment; of some that do not, the user is told.
     """
     found, lost = [], []
     for track in tracks:
@@ -103,7 +87,6 @@ def deviations_of(
 
     Parameters
     ----------
-    alignment : Alignment
     track_id : int or None
         Of the line.
     xyz : (n, 3) array

@@ -5,7 +5,7 @@ Lengths are metres and places local metres of the alignment's frame. `s` is the 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import ClassVar, Optional, Union
@@ -14,7 +14,36 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..frame import LocalFrame
-from .curves import displaced, turned
+
+NODES = 12
+"""Of the Gauss-Legendre rule: with panels of `PANEL_RAD`, the error is below 1e-12 m at a radius of 150 m."""
+
+PANEL_RAD = 1.0
+"""Largest turn that one application of the rule covers, radians."""
+
+_ABSCISSAE, _WEIGHTS = np.polynomial.legendre.leggauss(NODES)
+UNIT_NODES, UNIT_WEIGHTS = 0.5 * (_ABSCISSAE + 1.0), 0.5 * _WEIGHTS
+"""The rule on the interval from 0 to 1, (12,) each."""
+
+
+def turned(u: np.ndarray, k_from: np.ndarray, change: np.ndarray) -> np.ndarray:
+    """Return by how much the direction has turned at distance `u`, radians; `change` of the curvature is in 1/m²."""
+    return u * (k_from + 0.5 * change * u)
+
+
+def displaced(u: np.ndarray, heading: np.ndarray, k_from: np.ndarray, change: np.ndarray) -> np.ndarray:
+    """Return the way from the start of an element to the place at distance `u`, (n, 2) metres; see `turned`."""
+    turn = np.abs(u) * (np.abs(k_from) + np.abs(change * u))
+    panels = int(np.ceil(turn.max(initial=0.0) / PANEL_RAD)) or 1
+    ends = u[:, None] * np.arange(panels + 1) / panels
+    way = np.zeros((len(u), 2))
+    for start, end in zip(ends.T[:-1], ends.T[1:]):
+        at = start[:, None] + (end - start)[:, None] * UNIT_NODES
+        angle = heading[:, None] + turned(at, k_from[:, None], change[:, None])
+        way[:, 0] += (end - start) * (np.cos(angle) @ UNIT_WEIGHTS)
+        way[:, 1] += (end - start) * (np.sin(angle) @ UNIT_WEIGHTS)
+    return way
+
 
 SAGITTA_M = 0.0009
 """Largest distance of a drawn curve from the exact one, metres: below a millimetre, which no scanner resolves."""
@@ -77,22 +106,31 @@ class Figures:
 
 
 @dataclass(frozen=True)
-class PlanElement:
+class Stretch:
+    """A part of a curve: the distance along the curve at which it starts, and its length, metres."""
+
+    s_from: float
+    length_m: float
+
+    @property
+    def s_to(self) -> float:
+        """Distance along the curve of the end."""
+        return self.s_from + self.length_m
+
+
+@dataclass(frozen=True)
+class PlanElement(Stretch):
     """Line, arc or clothoid: the curvature changes linearly from start to end.
 
     Attributes
     ----------
-    s_from, length_m : float
     x, y, heading : float
         Start in local metres, and direction there in radians, counterclockwise from the x axis.
     k_from, k_to : float
         Curvature at start and end in 1/m, positive to the left.
-    figures : Figures
     """
 
     layout: ClassVar[str] = "H"
-    s_from: float
-    length_m: float
     x: float
     y: float
     heading: float
@@ -107,29 +145,20 @@ class PlanElement:
             return "clothoid"
         return "arc" if self.k_from else "line"
 
-    @property
-    def s_to(self) -> float:
-        """Distance along the curve of the end."""
-        return self.s_from + self.length_m
-
 
 @dataclass(frozen=True)
-class VerticalElement:
+class VerticalElement(Stretch):
     """Grade or parabola: the gradient changes linearly with `s`.
 
     Attributes
     ----------
-    s_from, length_m : float
     z : float
         Height of the start, local metres.
     grade_from, grade_to : float
         Gradient at start and end, metres per metre, positive uphill.
-    figures : Figures
     """
 
     layout: ClassVar[str] = "V"
-    s_from: float
-    length_m: float
     z: float
     grade_from: float
     grade_to: float
@@ -139,11 +168,6 @@ class VerticalElement:
     def type(self) -> str:
         """Grade or parabola."""
         return "grade" if self.grade_from == self.grade_to else "parabola"
-
-    @property
-    def s_to(self) -> float:
-        """Distance along the curve of the end."""
-        return self.s_from + self.length_m
 
     @property
     def curvature(self) -> float:
@@ -158,20 +182,16 @@ class VerticalElement:
 
 
 @dataclass(frozen=True)
-class CantElement:
+class CantElement(Stretch):
     """Constant cant or a ramp: the cant changes linearly with `s`.
 
     Attributes
     ----------
-    s_from, length_m : float
     cant_from_m, cant_to_m : float
         Cant at start and end in metres, left rail minus right rail.
-    figures : Figures
     """
 
     layout: ClassVar[str] = "C"
-    s_from: float
-    length_m: float
     cant_from_m: float
     cant_to_m: float
     figures: Figures = field(default_factory=Figures)
@@ -186,11 +206,6 @@ class CantElement:
         ramp = (self.cant_to_m - self.cant_from_m) / self.length_m
         cants = [self.cant_from_m + (s - self.s_from) * ramp for s in (start, end)]
         return replace(self, s_from=start, length_m=end - start, cant_from_m=cants[0], cant_to_m=cants[1])
-
-    @property
-    def s_to(self) -> float:
-        """Distance along the curve of the end."""
-        return self.s_from + self.length_m
 
 
 Element = Union[PlanElement, VerticalElement, CantElement]
@@ -224,7 +239,6 @@ class Alignment:
 
     Attributes
     ----------
-    track_id : int or None
     frame : LocalFrame
         Of the places; it knows the coordinate system.
     plan : tuple of PlanElement
@@ -280,31 +294,28 @@ class Alignment:
 
     def heights(self, s: np.ndarray) -> np.ndarray:
         """Return heights, (n,) local metres; NaN where they are unknown."""
-        if not self.vertical:
-            return np.full(len(s), np.nan)
-        columns, u = _at(self._profile, s)
-        return np.where(
-            self._has(self.vertical, s), columns[:, 1] + u * (columns[:, 2] + 0.5 * u * columns[:, 3]), np.nan
+        return self._known(
+            self.vertical, self._profile, s, lambda u, _, z, grade, bend: z + u * (grade + 0.5 * u * bend)
         )
 
     def grades(self, s: np.ndarray) -> np.ndarray:
         """Return gradients, (n,) metres per metre, positive uphill; NaN where they are unknown."""
-        if not self.vertical:
-            return np.full(len(s), np.nan)
-        columns, u = _at(self._profile, s)
-        return np.where(self._has(self.vertical, s), columns[:, 2] + u * columns[:, 3], np.nan)
+        return self._known(self.vertical, self._profile, s, lambda u, _, __, slope, bend: slope + u * bend)
 
     def cants(self, s: np.ndarray) -> np.ndarray:
         """Return cants, (n,) metres, left rail minus right rail; NaN where they are unknown."""
-        if not self.cant:
-            return np.full(len(s), np.nan)
-        columns, u = _at(self._ramps, s)
-        return np.where(self._has(self.cant, s), columns[:, 1] + u * columns[:, 2], np.nan)
+        return self._known(self.cant, self._ramps, s, lambda u, _, cant, ramp: cant + u * ramp)
 
-    def _has(self, elements: Sequence[Element], s: np.ndarray) -> np.ndarray:
-        """Return whether elements in height or of cant reach each distance, (n,) bool; with the plan, they continue."""
+    def _known(
+        self, elements: Sequence[Element], rows: np.ndarray, s: np.ndarray, value: Callable[..., np.ndarray]
+    ) -> np.ndarray:
+        """Return a value of the distance in an element and its row; NaN where no element, continued as the plan, is."""
+        if not elements:
+            return np.full(len(s), np.nan)
         first, last = elements[0].s_from - CONTINUED_M, elements[-1].s_to + CONTINUED_M
-        return ((s >= first) | (first <= self.s_from)) & ((s <= last) | (last >= self.s_to))
+        reached = ((s >= first) | (first <= self.s_from)) & ((s <= last) | (last >= self.s_to))
+        found, u = _at(rows, s)
+        return np.where(reached, value(u, *found.T), np.nan)
 
     def xyz(self, s: np.ndarray) -> np.ndarray:
         """Return places, (n, 3) local metres; z is NaN where heights are unknown."""
@@ -395,19 +406,8 @@ def _at(rows: np.ndarray, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def chained(
     start: tuple[float, float], heading: float, shapes: Sequence[tuple[float, float, float]]
 ) -> tuple[PlanElement, ...]:
-    """Return plan elements that continue each other in place and direction, from `s` = 0.
+    """Return plan elements, given length and curvatures, that continue each other from `s` = 0.
 
-    Parameters
-    ----------
-    start : (float, float)
-        Local metres.
-    heading : float
-        Radians counterclockwise from the x axis.
-    shapes : sequence of (length_m, k_from, k_to)
-        Of each element; see `PlanElement`.
-
-    Examples
-    --------
     >>> [(one.type, round(one.x, 3), round(one.y, 3)) for one in chained((0, 0), 0.0, [(10, 0, 0), (15.708, 0.1, 0.1)])]
     [('line', 0.0, 0.0), ('arc', 10.0, 0.0)]
     """

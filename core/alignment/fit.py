@@ -17,15 +17,12 @@ from ..progress import SILENT, Progress
 from .chain import Chain
 from .deviations import Deviations, deviations_of
 from .elements import Alignment, Element, PlanElement
-from .given import Given, given_along, given_of, noted, without
-from .intrinsic import lateral_signal
-from .layouts import cants, heights, on_clothoids
-from .measured import LEAST_POINTS, Measured, Track, measured_of
+from .held import Given, given_along, given_of, noted, off_element, with_round_radii, without
+from .layouts import cants, chain_errors, heights, on_clothoids, plan_errors, remaining
+from .measured import LEAST_POINTS, Measured, Track, lateral_signal, measured_of
 from .noise import Noise, strays
 from .plane_fit import FitError, PlanFit, Points, fit_plan
-from .rounding import off_element, with_round_radii
 from .signals import CANT, HEIGHT, PLAN, Kind, Signal, find_structure, noise_of, refitted
-from .uncertainty import chain_errors, plan_errors, remaining
 
 HOLDS = 3.0
 """A fit does not hold where the line is off by more than this many tolerances, as a root mean square."""
@@ -51,8 +48,6 @@ class Fit:
 
     Attributes
     ----------
-    alignment : Alignment
-    deviations : Deviations
     rms_mm : float
         Root mean square of the slews.
     noise : Noise
@@ -72,17 +67,9 @@ def fit_track(
     fixed: Optional[Alignment] = None,
     progress: Progress = SILENT,
 ) -> Fit:
-    """Fit the design elements of a track.
+    """Fit the design elements of a track; warn where the fit does not hold.
 
-    Parameters
-    ----------
-    track : Track
-    frame : LocalFrame
-    settings : FitParameters
-    fixed : Alignment, optional
-        Elements whose types, and edited radii and ends, are held.
-    progress : Progress
-        Warned where the fit does not hold.
+    The types of `fixed` elements are held, and the radii and ends that were edited.
 
     Raises
     ------
@@ -112,21 +99,12 @@ def fit_tracks(
     fixed: Mapping[Optional[int], Alignment],
     progress: Progress = SILENT,
 ) -> list[Fit]:
-    """Fit the design elements of tracks; those that cannot have any are named and left out.
-
-    Parameters
-    ----------
-    tracks : sequence of Track
-    frame : LocalFrame
-    settings : FitParameters
-    fixed : mapping of int to Alignment
-        Elements by track, whose types, and edited radii and ends, are held.
-    progress : Progress
+    """Fit the design elements of tracks; those that cannot have any are named and left out. See `fit_track`.
 
     Raises
     ------
     ParameterError
-        No track can have an alignment, or `fixed` has none of the tracks.
+        No track can have an alignment, or `fixed`, elements by track, has none of the tracks.
     """
     if fixed and not any(track.track_id in fixed for track in tracks):
         raise ParameterError("FIXED has no elements of the tracks in INPUT: give the table of these tracks.")
@@ -282,17 +260,7 @@ def _warn_of_noise(track_id: int, elements: Sequence[PlanElement], progress: Pro
 def _holding(
     track_id: int, elements: Sequence[PlanElement], feet: np.ndarray, tolerance_m: float, progress: Progress
 ) -> tuple[int, int]:
-    """Return the first and the last element of the longest part of the fit that holds; warn if it is not the whole.
-
-    Parameters
-    ----------
-    track_id : int
-    elements : sequence of PlanElement
-    feet : (n,) array
-        Of the points that count, increasing, metres.
-    tolerance_m : float
-    progress : Progress
-    """
+    """Return the first and the last element of the longest part of the fit that holds; warn if it is not the whole."""
     limit_mm = 1000.0 * HOLDS * tolerance_m
     holds = np.array([(one.figures.dev_rms_mm or 0.0) <= limit_mm for one in elements])
     if holds.all():

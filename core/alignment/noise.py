@@ -63,29 +63,14 @@ class Noise:
         return self.shared_m**2 * np.exp(-((lag_m / self.length_m) ** 2))
 
     def effective_m(self, step_m: float) -> float:
-        """Return the standard deviation of independent errors that bend long elements as much, metres.
-
-        Parameters
-        ----------
-        step_m : float
-            Distance between the points.
-        """
+        """Return the standard deviation of independent errors, one each step, that bend long elements as much."""
         return math.sqrt(self.white_m**2 + self.shared_m**2 * math.sqrt(math.pi) * self.length_m / step_m)
 
     def factor(self, s: np.ndarray, spread: np.ndarray, variance: np.ndarray) -> Optional[np.ndarray]:
-        """Return the Cholesky factor of the covariance of means over blocks, in the lower form of banded matrices.
+        """Return the Cholesky factor of the covariance of means over blocks, (b, n) metres, in lower banded form.
 
-        Parameters
-        ----------
-        s, spread : (n,) array
-            Mean and variance of the distances of the points in each block, in order; metres, square metres.
-        variance : (n,) array
-            Of what is independent in the mean, square metres.
-
-        Returns
-        -------
-        (b, n) array or None
-            Metres; None without misalignment.
+        The distances of the points in each block have a mean and a variance, `s` and `spread`; `variance` is that of
+        what is independent in the mean. None without misalignment.
         """
         if not self.shared_m:
             return None
@@ -206,12 +191,7 @@ def _products(rest: np.ndarray) -> np.ndarray:
 def _expected_of(kinds: Mapping[tuple[int, int], float], correlation: np.ndarray) -> np.ndarray:
     """Return the sums of products to expect at each lag, (LAGS,), for errors with a correlation by lag.
 
-    Parameters
-    ----------
-    kinds : mapping
-        Number of points by size of the piece and degree of its polynomial.
-    correlation : (n,) array
-        At each lag.
+    The numbers of points are given by the size of the piece and the degree of its polynomial.
     """
     total = np.zeros(LAGS)
     for (size, degree), count in kinds.items():
@@ -225,14 +205,7 @@ def _expected_of(kinds: Mapping[tuple[int, int], float], correlation: np.ndarray
 
 
 def shared_covariance(s: np.ndarray, noise: Noise) -> sparse.csr_matrix:
-    """Return the covariance of the misalignment at points, (n, n), square metres.
-
-    Parameters
-    ----------
-    s : (n,) array
-        Distances of the points, increasing.
-    noise : Noise
-    """
+    """Return the covariance of the misalignment at points with increasing distances, (n, n), square metres."""
     count = len(s)
     rows, columns, values = [np.arange(count)], [np.arange(count)], [np.full(count, noise.shared_m**2)]
     lag = 1

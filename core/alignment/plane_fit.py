@@ -16,8 +16,7 @@ from scipy.sparse.linalg import splu
 
 from ..progress import SILENT, Progress
 from .chain import NOTHING, Chain, Held
-from .curves import PANEL_RAD, UNIT_NODES, UNIT_WEIGHTS, displaced, turned
-from .elements import PlanElement
+from .elements import PANEL_RAD, UNIT_NODES, UNIT_WEIGHTS, PlanElement, displaced, turned
 
 ROUNDS, CLOSED_M, OPEN_M = 40, 1e-6, 1e-5
 """Largest number of steps, the gap between elements and the change at which they end, and the gap beyond which the fit
@@ -85,7 +84,6 @@ class PlanFit:
 
     Attributes
     ----------
-    elements : tuple of PlanElement
     across : (n,) array
         Distance of each point from the curve, positive to the left, metres.
     s : (n,) array
@@ -158,18 +156,7 @@ def fit_plan(
     progress: Progress = SILENT,
     poses: Optional[np.ndarray] = None,
 ) -> PlanFit:
-    """Fit the elements of a chain to points.
-
-    Parameters
-    ----------
-    chain : Chain
-        The structure and first values.
-    points : Points
-    held : Held
-    progress : Progress
-    poses : (e, 3) array, optional
-        First values of places and directions at the starts of the elements; else they are those of the line.
-    """
+    """Fit the elements of a chain, which has the first values, to points; first poses, (e, 3), else are the line's."""
     number = np.where(chain.curved, np.cumsum(chain.curved) - 1, -1)
     bends = chain.bends.copy()
     bends[list(held.bends)] = list(held.bends.values())

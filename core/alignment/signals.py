@@ -1,17 +1,17 @@
-"""From a signal to its structure: the noise, a first partition, and the search."""
+"""From a signal to its structure: the noise, a first partition into polynomials, and the search."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..progress import SILENT, Progress
-from .chain import NOTHING, Chain, Held, fitted, start_of
+from .chain import NOTHING, Chain, Held, Span, assembled, fitted, start_of
 from .noise import Noise, estimated, independent_m
-from .partition import Piece, partition
-from .structure import Blocks, Rules, from_pieces, searched
+from .structure import Blocks, Rules, searched
 
 NOISE_ROUNDS, SETTLED = 8, 1.15
 """Largest number of partitions for the noise, and the growth of the noise below which it is known."""
@@ -55,13 +55,24 @@ class Kind:
         Whether the bend may change linearly.
     least_m : float
         Least standard deviation of the errors, metres.
+    shown_m : float
+        See `Rules`; where the line was smoothed.
     """
 
     order: int
     degrees: tuple[int, ...]
     ramps: bool
     least_m: float = 0.0
+    shown_m: float = 0.0
 
+    def shown(self, noise: Noise) -> float:
+        """Return the distance from a curve that no survey shows, metres; 0 where single points scatter."""
+        return self.shown_m if noise.white_m < SMOOTH * self.shown_m else 0.0
+
+
+SMOOTH = 0.2
+"""Share of `Kind.shown_m` below which single points scatter only if the line was smoothed: errors of several lengths
+hang together then, and what the search takes for its noise is less than these."""
 
 LEAST_ERROR_M = 0.001
 """Least standard deviation of a line across and in height, metres: no survey of a track is better. Where single points
@@ -69,7 +80,8 @@ scatter by less, the line was smoothed, and what their errors lack is shared by 
 would be taken for elements."""
 
 PLAN, HEIGHT = Kind(2, (1, 2, 3), True, LEAST_ERROR_M), Kind(2, (1, 2), False, LEAST_ERROR_M)
-CANT = Kind(1, (0, 1), False)
+CANT = Kind(1, (0, 1), False, shown_m=math.sqrt(2.0) * LEAST_ERROR_M)
+"""Kinds of signals. Cant is the difference of two heights."""
 
 
 @dataclass(frozen=True)
@@ -82,7 +94,6 @@ class Signal:
         Distance and value, metres.
     share : (n,) array
         How much each point counts, 1 for a measured one, 0 in a bridged gap.
-    kind : Kind
     """
 
     s: np.ndarray
@@ -100,19 +111,12 @@ class Signal:
         return Blocks.of(self.s, self.y, self.share, noise)
 
 
-def noise_of(signal: Signal, tolerance_m: float, progress: Progress = SILENT) -> tuple[Noise, list[Piece]]:
-    """Return the noise of a signal, and the partition for it.
+def noise_of(signal: Signal, tolerance_m: float, progress: Progress = SILENT) -> tuple[Noise, list[Polynomial]]:
+    """Return the noise of a signal, with misalignment up to a tolerance, and the partition for it.
 
     The finer a partition is, the less is left as noise. From the errors of single points upwards, the noise is raised
     until a partition leaves no more than it was made for. Misalignment raises it at every step; where there is none,
     the first partition remains.
-
-    Parameters
-    ----------
-    signal : Signal
-    tolerance_m : float
-        Largest standard deviation of the misalignment.
-    progress : Progress
     """
     used = signal.share > 0
     s, y = signal.s[used], signal.y[used]
@@ -146,7 +150,7 @@ def _at_least(noise: Noise, least_m: float) -> Noise:
     return Noise(noise.white_m, math.sqrt(noise.shared_m**2 + lack), length_m)
 
 
-def _residuals(pieces: list[Piece], s: np.ndarray, y: np.ndarray) -> list[tuple[np.ndarray, int]]:
+def _residuals(pieces: list[Polynomial], s: np.ndarray, y: np.ndarray) -> list[tuple[np.ndarray, int]]:
     """Return the residuals of the polynomials of a partition, and their degrees."""
     made = []
     for piece in pieces:
@@ -162,26 +166,32 @@ def _residuals(pieces: list[Piece], s: np.ndarray, y: np.ndarray) -> list[tuple[
 def find_structure(
     signal: Signal, tolerance_m: float, least_m: float, jumps: bool, progress: Progress = SILENT
 ) -> tuple[Chain, Noise]:
-    """Return the chain that explains a signal, and the noise that is left.
+    """Return the chain that explains a signal, and the noise that is left; see `noise_of`.
 
-    Parameters
-    ----------
-    signal : Signal
-    tolerance_m : float
-        See `noise_of`.
-    least_m : float
-        Least length of a part or a ramp, metres.
-    jumps : bool
-        Whether the bend may jump; where it cannot change linearly, it always may.
-    progress : Progress
+    Parts and ramps have a least length, metres. Where the bend cannot change linearly, it may always jump.
     """
     first, second = progress.divide([1.0, 4.0])
     noise, pieces = noise_of(signal, tolerance_m, first)
     sigma = noise.effective_m(signal.step_m)
     price = max(math.log(len(signal.s) * (noise.white_m / sigma) ** 2), LEAST_PRICE)
-    rules = Rules(signal.kind.ramps, jumps or not signal.kind.ramps, least_m, price)
-    chain = from_pieces(pieces, signal.kind.order, rules)
+    rules = Rules(signal.kind.ramps, jumps or not signal.kind.ramps, least_m, price, signal.kind.shown(noise))
+    chain = _from_pieces(pieces, signal.kind.order, rules)
     return searched(chain, signal.blocks(noise), rules, second), noise
+
+
+def _from_pieces(pieces: Sequence[Polynomial], order: int, rules: Rules) -> Chain:
+    """Return a chain with the pieces of a partition: those of highest degree are ramps if there are ramps."""
+    spans = [Span(one.start, one.end, one.degree > order, one.degree == order) for one in pieces]
+    chain = assembled(spans, order)
+    return chain if rules.jumps or order == 1 else _without_jumps(chain, rules.least_m)
+
+
+def _without_jumps(chain: Chain, least_m: float) -> Chain:
+    """Return a chain with a short ramp in place of each jump."""
+    starts, ends = chain.extents
+    room = 0.4 * np.minimum(ends[:-1] - starts[:-1], ends[1:] - starts[1:])
+    half = np.where(chain.p == chain.q, np.minimum(0.5 * least_m, room), 0.0)
+    return replace(chain, p=chain.p - half, q=chain.q + half)
 
 
 def refitted(chain: Chain, signal: Signal, noise: Noise, least_m: float, held: Held = NOTHING) -> Chain:
@@ -197,3 +207,112 @@ def refitted(chain: Chain, signal: Signal, noise: Noise, least_m: float, held: H
 def started(chain: Chain, signal: Signal, noise: Noise) -> np.ndarray:
     """Return the value at the start of a chain, and with order 2 the slope there, (order,)."""
     return start_of(chain, signal.blocks(noise).near(chain))
+
+
+BLOCK_M = 4.0
+"""Distance between the places where a piece may begin, metres: the search moves the ends afterwards."""
+
+SCALE_M = 300.0
+"""Unit of length inside, metres, so that powers of the distance are neither tiny nor huge."""
+
+PIECE_PENALTY, DEGREE_PENALTY = 1.0, 0.5
+"""Cost of a piece, and of each degree, in units of the logarithm of the number of points: half of the information
+criterion on purpose, because it is easier for the search to unite pieces than to find a missing one."""
+
+KEPT_M = 60.0
+"""A start nearer than this is never dropped, metres: too few points say anything about its piece."""
+
+LONGEST_M = 1500.0
+"""Starts farther behind are dropped, metres; the search unites the pieces of a longer element."""
+
+
+@dataclass(frozen=True)
+class Polynomial:
+    """A piece of the signal.
+
+    Attributes
+    ----------
+    start, end : float
+        Distances, metres.
+    degree : int
+        Of its polynomial.
+    """
+
+    start: float
+    end: float
+    degree: int
+
+
+def partition(
+    s: np.ndarray,
+    y: np.ndarray,
+    sigma: float,
+    degrees: Sequence[int],
+    ends: tuple[float, float],
+    progress: Progress = SILENT,
+) -> list[Polynomial]:
+    """Divide a signal into polynomials between two ends; its errors have a standard deviation, metres.
+
+    Each of the degrees that a piece may have is one more than the one before.
+    """
+    count = max(int(round((ends[1] - ends[0]) / BLOCK_M)), 1)
+    bounds = np.linspace(*ends, count + 1)
+    firsts = np.searchsorted(s, bounds)
+    firsts[-1] = len(s)
+    log_n = math.log(max(len(s), 2))
+    costs = [(PIECE_PENALTY + DEGREE_PENALTY * degree) * log_n for degree in degrees]
+    best, came = np.full(count + 1, np.inf), np.zeros((count + 1, 2), dtype=int)
+    best[0] = 0.0
+    starts, factors = np.zeros(0, dtype=int), np.zeros((0, degrees[-1] + 1, degrees[-1] + 2))
+    rest = np.zeros(0)
+    for block in progress.follow(range(count)):
+        starts = np.append(starts, block)
+        factors = np.concatenate([factors, np.zeros((1, *factors.shape[1:]))])
+        rest = np.append(rest, 0.0)
+        origin = s[np.minimum(firsts[starts], len(s) - 2)], y[np.minimum(firsts[starts], len(s) - 2)]
+        for k in range(firsts[block], firsts[block + 1]):
+            _take(factors, rest, (s[k] - origin[0]) / SCALE_M, (y[k] - origin[1]) / sigma)
+        rss = _nested(factors, rest, degrees)
+        total = best[starts, None] + rss + costs
+        at, which = np.unravel_index(np.argmin(total), total.shape)
+        best[block + 1], came[block + 1] = total[at, which], (starts[at], which)
+        behind = bounds[block + 1] - bounds[starts]
+        hopeless = best[starts] + rss[:, -1] + costs[0] > best[block + 1] + costs[-1]
+        kept = ((behind < KEPT_M) | ~hopeless) & (behind < LONGEST_M)
+        starts, factors, rest = starts[kept], factors[kept], rest[kept]
+    return _traced(came, bounds, degrees)
+
+
+def _take(factors: np.ndarray, rest: np.ndarray, x: np.ndarray, y: np.ndarray) -> None:
+    """Add a point to the triangular factors of all starts, by Givens rotations.
+
+    Sums of powers would cancel: y reaches 10 km, and its errors are millimetres.
+    """
+    size = factors.shape[1]
+    row = np.empty((len(x), size + 1))
+    row[:, :size] = np.vander(x, size, increasing=True)
+    row[:, size] = y
+    for i in range(size):
+        radius = np.hypot(factors[:, i, i], row[:, i])
+        safe = np.where(radius > 0, radius, 1.0)
+        cos, sin = np.where(radius > 0, factors[:, i, i], 1.0) / safe, row[:, i] / safe
+        upper, lower = factors[:, i, i:].copy(), row[:, i:]
+        factors[:, i, i:] = cos[:, None] * upper + sin[:, None] * lower
+        row[:, i:] = cos[:, None] * lower - sin[:, None] * upper
+    rest += row[:, size] ** 2
+
+
+def _nested(factors: np.ndarray, rest: np.ndarray, degrees: Sequence[int]) -> np.ndarray:
+    """Return the sums of squared residuals of each start, one column per degree."""
+    last = factors[:, :, -1] ** 2
+    return np.column_stack([rest + last[:, degree + 1 :].sum(axis=1) for degree in degrees])
+
+
+def _traced(came: np.ndarray, ends: np.ndarray, degrees: Sequence[int]) -> list[Polynomial]:
+    """Return the pieces of the cheapest partition, from the start."""
+    pieces, block = [], len(ends) - 1
+    while block > 0:
+        start, which = came[block]
+        pieces.append(Polynomial(float(ends[start]), float(ends[block]), degrees[which]))
+        block = start
+    return pieces[::-1]

@@ -1,250 +1,116 @@
-"""Axes from lines with M values, from lines with a first kilometre, or from lines with posts.
+"""Stations of an alignment as design files state them: metres that continue along the curve, with equations at jumps.
 
-See docs/stationing.md.
+Kilometres come from an axis, on which numbers may be missing or twice, and on which a parallel track is longer or
+shorter. A design file knows the distance along the track's own curve, and states where stations do not continue it.
 """
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from bisect import bisect_left, bisect_right
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Optional
 
 import numpy as np
-from scipy.spatial import cKDTree
 
-from ..design_numbers import KM, LENGTH, NUMBER, checked
-from ..design_places import check_places
-from ..errors import RailExtractError
-from ..polyline import Polyline
-from .axis import Axis, nearest
-from .stationing import Jump, Stationing, stationing_of
+from .elements import Alignment
 
-POST_OFFSET_M = 50.0
-"""Posts further than this from the axis are left out, metres: they belong to another line."""
+MIN_JUMP_M = 0.05
+"""Smallest jump of the stations that becomes an equation, metres: a track beside its axis gains or loses millimetres
+from element to element."""
 
-ONE_POST_M = 10.0
-"""Posts of the same kilometre this close along the axis are one post, metres: there may be one on either side."""
-
-JOINED_M = 0.05
-"""Largest distance between the end of a line and the start of the next one of the same axis, metres."""
-
-UNIT_OFF = 0.2
-"""Largest share by which M values may differ from metres or kilometres along the line."""
+SAME_PLACE_M = 1e-4
+"""Places along the curve that differ by less are the same, metres: files have four decimals or more."""
 
 
 @dataclass(frozen=True)
-class AxisLine:
-    """A line of an axis as it is stored.
+class StationRange:
+    """A part of the curve on which stations continue.
 
     Attributes
     ----------
-    name : str
-        Of its axis.
-    xy : (n, 2) array
-        Metres.
-    m : (n,) array
-        M values, NaN where there is none.
+    s : float
+        Its start, metres along the curve.
+    station : float
+        Station of its start, metres.
+    rises : bool
+        Whether stations rise along the curve.
     """
 
-    name: str
-    xy: np.ndarray
-    m: np.ndarray
+    s: float
+    station: float
+    rises: bool = True
+
+    def at(self, s: float) -> float:
+        """Return the station of a place, metres."""
+        return self.station + (s - self.s if self.rises else self.s - s)
 
 
 @dataclass(frozen=True)
-class Post:
-    """A post beside an axis: its place, (2,) metres, and its kilometre."""
-
-    xy: np.ndarray
-    km: float
-
-
-@dataclass(frozen=True)
-class Start:
-    """The kilometre at the first vertex of a line, and whether kilometres decrease along it."""
-
-    km: float
-    decreasing: bool = False
-
-
-@dataclass(frozen=True)
-class Axes:
-    """Axes in one plane.
+class Stations:
+    """The stations along a curve.
 
     Attributes
     ----------
-    axes : tuple of Axis
-    notices : tuple of str
-        What the user is told of them.
+    pieces : tuple of StationRange
+        At least one, in order of `s`.
+
+    Examples
+    --------
+    >>> stations = Stations((StationRange(0.0, 1000.0), StationRange(50.0, 1200.0)))
+    >>> stations.ahead(50.0), stations.behind(50.0)
+    (1200.0, 1050.0)
     """
 
-    axes: tuple[Axis, ...]
-    notices: tuple[str, ...]
+    pieces: tuple[StationRange, ...]
+
+    def ahead(self, s: float) -> float:
+        """Return the station of a place, metres; at a jump, that ahead."""
+        return self.pieces[max(bisect_right(self._starts, s + SAME_PLACE_M) - 1, 0)].at(s)
+
+    def behind(self, s: float) -> float:
+        """Return the station of a place, metres; at a jump, that behind."""
+        return self.pieces[max(bisect_left(self._starts, s - SAME_PLACE_M) - 1, 0)].at(s)
+
+    @cached_property
+    def _starts(self) -> list[float]:
+        return [one.s for one in self.pieces]
 
 
-def make_axes(
-    lines: Sequence[AxisLine], start: Start | None = None, posts: Sequence[Post] = (), jumps: Sequence[Jump] = ()
-) -> Axes:
-    """Give lines their kilometres by posts, else by a first kilometre, else by their M values.
+def stations_of(alignment: Alignment) -> Optional[Stations]:
+    """Return the stations that the kilometres of the plan elements make; None if no element states both of its own.
 
-    Parameters
-    ----------
-    lines : sequence of AxisLine
-        At least one; those of one name that follow each other are joined.
-    start : Start, optional
-    posts : sequence of Post
-    jumps : sequence of Jump
-        Stated jumps; M values contain theirs.
-
-    Raises
-    ------
-    RailExtractError
-        Nothing states kilometres, or what does contradicts itself or is on no railway.
+    `km_from` and `km_to` may be those of the two ends in order along the track, or the smaller and the larger one.
     """
-    _check(lines, start, posts)
-    joined = [replace(line, name=line.name or str(number)) for number, line in enumerate(_joined(lines), start=1)]
-    if (jumps or (start is not None and not posts)) and len(joined) > 1:
-        what = "START_KM is" if start is not None and not posts else "JUMPS are"
-        raise RailExtractError(
-            f"AXIS has {len(joined)} lines that do not follow each other, but {what} for one: choose a single line, or "
-            "give M values."
-        )
-    if posts:
-        return _by_posts(joined, posts, jumps)
-    if start is not None:
-        (line,) = joined
-        turned = _directed(line, start.decreasing)
-        length_m = Polyline(turned.xy).length_m
-        numbered = stationing_of(length_m, [length_m if start.decreasing else 0.0], [start.km], jumps)
-        return _told([Axis(line.name, turned.xy, numbered)])
-    if jumps:
-        raise RailExtractError("JUMPS need START_KM or POSTS: M values of AXIS contain their jumps.")
-    return _told([_by_measures(line) for line in joined])
-
-
-def _check(lines: Sequence[AxisLine], start: Start | None, posts: Sequence[Post]) -> None:
-    """Refuse lines, a start and posts that are on no railway; where they are read, kilometres are checked."""
-    for number, line in enumerate(lines, start=1):
-        where = f"The line {line.name or number} of AXIS"
-        check_places(line.xy, where)
-        for m in line.m[~(np.isnan(line.m) | (np.abs(line.m) <= NUMBER.high))][:1]:
-            checked(float(m), NUMBER, where, "M value")
-        checked(Polyline(line.xy).length_m, LENGTH, where, "length")
-    if start is not None:
-        checked(start.km, KM, "AXIS", "START_KM")
-    for post in posts:
-        check_places(post.xy[None], f"The post of km {post.km:g} in POSTS")
-
-
-def _told(axes: Sequence[Axis], more: Sequence[str] = ()) -> Axes:
-    """Return axes with the sentences about them."""
-    notices = [*more, *(notice for axis in axes for notice in axis.stationing.notices)]
-    return Axes(tuple(axes), tuple(notices))
-
-
-def _joined(lines: Sequence[AxisLine]) -> list[AxisLine]:
-    """Join lines of one name where one ends at the start of exactly one other."""
-    follower = _followers(lines)
-    led, chains = set(follower.values()), []
-    left = dict.fromkeys(sorted(range(len(lines)), key=lambda number: number in led))  # beginnings first, rings last
-    while left:
-        chain = [next(iter(left))]
-        while chain[-1] in left:
-            del left[chain[-1]]
-            if follower.get(chain[-1]) in left:
-                chain.append(follower[chain[-1]])
-        chains.append([lines[number] for number in chain])
-    return [
-        AxisLine(chain[0].name, np.concatenate([one.xy for one in chain]), np.concatenate([one.m for one in chain]))
-        for chain in chains
+    known = [
+        (one.s_from, one.figures.km_from, one.figures.km_to)
+        for one in alignment.plan
+        if one.figures.km_from is not None and one.figures.km_to is not None
     ]
+    if not known:
+        return None
+    (_, *first), (_, *last) = known[0], known[-1]
+    rises = sum(last) >= sum(first) if len(known) > 1 else last[1] >= last[0]
+    pieces: list[StationRange] = []
+    for s, *ends in known:
+        piece = StationRange(s, 1000.0 * (min(ends) if rises else max(ends)), rises)
+        if not pieces or abs(pieces[-1].at(piece.s) - piece.station) >= MIN_JUMP_M:
+            pieces.append(piece)
+    start = StationRange(alignment.s_from, pieces[0].at(alignment.s_from), rises)
+    return Stations((start, *pieces[1:]))
 
 
-def _followers(lines: Sequence[AxisLine]) -> dict[int, int]:
-    """Return the number of the line that follows each line, where it is the only one and follows no other."""
-    starts, ends = (np.array([line.xy[at] for line in lines]) for at in (0, -1))
-    near = cKDTree(starts).query_ball_point(ends, JOINED_M)
-    pairs = [
-        (one, other)
-        for one, others in enumerate(near)
-        for other in others
-        if other != one and lines[one].name == lines[other].name
-    ]
-    leaving, arriving = Counter(one for one, _ in pairs), Counter(other for _, other in pairs)
-    return {one: other for one, other in pairs if leaving[one] == arriving[other] == 1}
+def measured(alignment: Alignment) -> np.ndarray:
+    """Return the vertices of the whole curve with the kilometre of each, (n, 4), local metres and kilometres.
 
-
-def _directed(line: AxisLine, backwards: bool) -> AxisLine:
-    """Return a line with the kilometres, without vertices that repeat the one before."""
-    xy = line.xy[::-1] if backwards else line.xy
-    moves = np.append(True, np.any(np.diff(xy, axis=0) != 0, axis=1))
-    return replace(line, xy=xy[moves], m=(line.m[::-1] if backwards else line.m)[moves])
-
-
-def _by_measures(line: AxisLine) -> Axis:
-    """Give a line its kilometres by its M values; a repeated vertex with another value is a jump."""
-    known = np.isfinite(line.m)
-    s, m = Polyline(line.xy).t[known], line.m[known]
-    rise, way = np.abs(np.diff(m)), np.diff(s)
-    if known.sum() < 2 or not (way > 0).any():
-        raise RailExtractError(
-            "AXIS has no M values: fill in START_KM, or give POSTS or an axis whose vertices have kilometres as M."
-        )
-    per_metre = float(np.median(rise[way > 0] / way[way > 0]))
-    unit_km = next((unit for unit in (1.0, 0.001) if abs(per_metre * 1000 * unit - 1) <= UNIT_OFF), None)
-    if unit_km is None:
-        raise RailExtractError(
-            f"AXIS has M values that change by {per_metre:.3g} per metre, so they are neither metres nor kilometres: "
-            "fill in START_KM, or correct them."
-        )
-    backwards = bool(np.sum(np.sign(np.diff(m))) < 0)
-    length_m = Polyline(line.xy).length_m
-    if backwards:
-        s, m = length_m - s[::-1], m[::-1]
-    return Axis(line.name, _directed(line, backwards).xy, stationing_of(length_m, s.tolist(), (unit_km * m).tolist()))
-
-
-def _by_posts(lines: Sequence[AxisLine], posts: Sequence[Post], jumps: Sequence[Jump]) -> Axes:
-    """Give lines their kilometres by the posts that are nearest to each."""
-    km, xy = np.array([post.km for post in posts]), np.array([post.xy for post in posts])
-    plain = [Axis(line.name, _directed(line, False).xy, Stationing(*np.zeros((3, 1)))) for line in lines]
-    near = nearest(plain, xy, np.inf)
-    far = near.distance_m > POST_OFFSET_M
-    made = []
-    for number, axis in enumerate(plain):
-        mine = np.flatnonzero((near.axis == number) & ~far)
-        if not len(mine):
-            raise RailExtractError(
-                f"No post is within {POST_OFFSET_M:g} m of the axis {axis.name}: check POSTS and their "
-                "coordinate system."
-            )
-        made.append(_numbered(axis, near.s[mine], km[mine], jumps))
-    count = int(far.sum())
-    left_out = f"{count} of {len(posts)} posts are more than {POST_OFFSET_M:g} m from AXIS: left out."
-    return _told(made, [left_out] if count else [])
-
-
-def _numbered(axis: Axis, s: np.ndarray, km: np.ndarray, jumps: Sequence[Jump]) -> Axis:
-    """Give an axis its kilometres by the feet of its posts, in whichever direction they increase."""
-    s, km = _distinct(s, km)
-    if len(s) < 2:
-        raise RailExtractError(
-            f"The axis {axis.name} has one post, which does not show where kilometres increase: give a second one."
-        )
-    backwards = bool(np.sum(np.sign(np.diff(km))) < 0)
-    length_m = axis.line.length_m
-    if backwards:
-        s, km = length_m - s[::-1], km[::-1]
-    xy = axis.xy[::-1] if backwards else axis.xy
-    return Axis(axis.name, xy, stationing_of(length_m, s.tolist(), km.tolist(), jumps))
-
-
-def _distinct(s: np.ndarray, km: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Sort posts along the axis; those of one kilometre next to each other are one, in their middle."""
-    order = np.lexsort((s, km))
-    s, km = s[order], km[order]
-    new = np.append(True, (np.diff(km) != 0) | (np.diff(s) > ONE_POST_M))
-    group = np.cumsum(new) - 1
-    s, km = np.bincount(group, s) / np.bincount(group), km[new]
-    order = np.argsort(s, kind="stable")
-    return s[order], km[order]
+    A jump of the kilometres has two vertices at the same place. Kilometres are NaN if they are unknown.
+    """
+    s = alignment.stations(alignment.s_from, alignment.s_to)
+    stations = stations_of(alignment)
+    if stations is None:
+        return np.column_stack([alignment.xyz(s), np.full(len(s), np.nan)])
+    jumps = np.array([piece.s for piece in stations.pieces[1:]])
+    s = np.sort(np.concatenate([s[~np.isin(s, jumps)], jumps, jumps]))
+    repeated = np.append(False, np.diff(s) == 0)
+    known = [stations.ahead(place) if again else stations.behind(place) for place, again in zip(s, repeated)]
+    return np.column_stack([alignment.xyz(s), np.array(known) / 1000.0])

@@ -8,8 +8,8 @@ from dataclasses import replace
 from ..parameters import Parameters
 from ..progress import Progress
 from ..rails import RailNetwork
-from ..squares.density import warn_of_airborne, warn_of_unexplained
-from ..squares.grid import SortedPoints
+from ..tiles.grid import SortedPoints
+from .density import warn_of_airborne, warn_of_unexplained
 from .doubts import doubting_jumps, doubting_scatter, gauge_scatter, warn_of_strips
 from .lines import warn_of_rails, warn_of_split_classes, with_tracks
 from .standard import head_widths

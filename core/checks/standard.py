@@ -22,10 +22,10 @@ from ..heads.sections import likelier_width
 from ..parameters import Parameters
 from ..progress import SILENT, Progress
 from ..rails import HEAD_OFF_M, HeadWidths, RailLine, SearchFigures
-from ..squares.density import fullest_square
-from ..squares.grid import PointSource
-from ..standards import HEAD_WIDTH_RANGE_MM, SAME_GAUGE_M, STANDARDS, Gauge, RailStandard, closest_standard
+from ..standards import HEAD_WIDTH_RANGE_MM, SAME_GAUGE_M, STANDARDS, Gauge, RailStandard, closest_standard, of_gauge
+from ..tiles.grid import PointSource
 from ..tracks.parallels import width_at
+from .density import fullest_square
 from .gauge_estimate import Spacings, measure_spacings
 
 SAMPLE_M = 50.0
@@ -175,11 +175,13 @@ def _detected(spacings: Spacings, progress: Progress) -> RailStandard:
         raise ParameterError(
             f"No rail standard could be detected{found}: choose STANDARD, or fill in GAUGE and HEAD_WIDTH."
         )
+    if abs(measured[1] - standard.head_width_m) > 2 * HEAD_OFF_M:
+        return _assumed(standard, measured, progress)
     off_m = max(TABLES_DIFFER_M, 2 * spacings.width_error_m())
     others = [
         one.profile
-        for one in sorted(STANDARDS.values(), key=lambda one: abs(one.head_width_m - measured[1]))
-        if one.gauge_m == standard.gauge_m and abs(one.head_width_m - measured[1]) <= off_m and one != standard
+        for one in sorted(of_gauge(standard.gauge_m), key=lambda one: abs(one.head_width_m - measured[1]))
+        if abs(one.head_width_m - measured[1]) <= off_m and one != standard
     ]
     more = f" and {len(others) - MAX_OTHERS} more" if len(others) > MAX_OTHERS else ""
     also = f", also {', '.join(others[:MAX_OTHERS])}{more}" if others else ""
@@ -187,6 +189,20 @@ def _detected(spacings: Spacings, progress: Progress) -> RailStandard:
         f"Detected {standard.label} ({standard.name}): rails are {1000 * measured[0]:.0f} mm apart, head "
         f"{1000 * measured[1]:.0f} ± {np.ceil(1000 * off_m):.0f} mm; fits {standard.profile}{also}."
     )
+    return standard
+
+
+def _assumed(standard: RailStandard, measured: tuple[float, float], progress: Progress) -> RailStandard:
+    """Say that a standard is assumed by the distance of the rails alone, and offer the one that fits this best."""
+    progress.warning(
+        f"Rails are {_in_words(*measured)}. No standard has such heads: the cloud is blunt, or has more than heads. "
+        f"{standard.label} ({standard.name}) is assumed, as its rails are this far apart; if the profile is another "
+        "one, choose it as STANDARD."
+    )
+    head_width_m = measured[0] - standard.gauge_m
+    closest = min(of_gauge(standard.gauge_m), key=lambda one: abs(one.head_width_m - head_width_m))
+    if closest != standard:
+        progress.propose(closest.name)
     return standard
 
 

@@ -64,12 +64,10 @@ def points_near(
 
     Parameters
     ----------
-    request : Request
     places : sequence of (3,) arrays
         Metres from the zero of the coordinate system, as `request.zero` converts them.
     reach_m : float
         Distance in plan.
-    progress : Progress
 
     Returns
     -------

@@ -176,6 +176,17 @@ def name_of(crs: pyproj.CRS) -> str:
     return " ".join(crs.name.split())[:MAX_NAME]
 
 
+def title_of(wkt: str | None) -> str:
+    """Return the code of a coordinate system, else its name, for messages.
+
+    >>> title_of(parse_crs("EPSG:25832").to_wkt()), title_of(None)
+    ('EPSG:25832', 'no coordinate system')
+    """
+    crs = parse_crs(wkt) if wkt else None
+    authority = crs.to_authority() if crs else None
+    return ":".join(authority) if authority else _name(crs)
+
+
 def codes_and_names(crs: pyproj.CRS) -> tuple[int | None, str, str]:
     """Return the EPSG code of the plan, None without one, its name, and the name of the heights, empty without one.
 
@@ -214,6 +225,12 @@ def is_geographic(crs: pyproj.CRS) -> bool:
     return _plane(crs).is_geographic
 
 
+def unit_in_plan(crs_wkt: str | None) -> float:
+    """Return the length in metres of the unit in plan; that of degrees, or of an unknown system, counts as 1."""
+    crs = parse_crs(crs_wkt) if crs_wkt else None
+    return 1.0 if crs is None or is_geographic(crs) else units(crs)[0]
+
+
 def _plane(crs: pyproj.CRS) -> pyproj.CRS:
     """Return the horizontal part of a system."""
     return _unbound((_unbound(crs).sub_crs_list or [crs])[0])
@@ -245,12 +262,10 @@ def warn_of_scale(
 
     Parameters
     ----------
-    crs : pyproj.CRS
     places : sequence of (x, y)
         In units of the CRS. One place with an acceptable scale factor is enough: the others may belong to stray points.
     what, it : str
         Subject and verb of the sentence, such as "cloud.laz is", and the pronoun that refers to the subject.
-    progress : Progress
     """
     plane = _plane(crs)
     known = [one for one in _scales(plane, places) if np.isfinite(one).all()] if plane.is_projected else []

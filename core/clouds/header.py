@@ -23,8 +23,6 @@ class CloudHeader:
 
     Attributes
     ----------
-    path : Path
-    point_count : int
     extent : tuple of float
         Smallest x, smallest y, largest x, largest y in units of the CRS.
     crs_wkt : str or None

@@ -32,7 +32,6 @@ def marks_of(source_ids: np.ndarray, file_source_id: int, gps_time: np.ndarray |
     Parameters
     ----------
     source_ids : (n,) uint16 array
-    file_source_id : int
     gps_time : (n,) array or None
         Seconds; None if the file states no time.
 

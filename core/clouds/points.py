@@ -45,8 +45,6 @@ class RailPoints:
     ----------
     xyz : (n, 3) array
         Local metres.
-    frame : LocalFrame
-    class_code : int
     strips : (n,) array or None
         Number of the strip, a pass of the scanner, that each point belongs to; None if all points are of one strip.
     found : bool
@@ -100,7 +98,6 @@ def read_rail_points(
         Coordinate system, as WKT or EPSG code, used where files state none.
     extent : tuple of float, optional
         Smallest x, smallest y, largest x, largest y of the points to keep, in units of the CRS.
-    progress : Progress
 
     Returns
     -------
@@ -147,8 +144,6 @@ class Request:
 
     Attributes
     ----------
-    headers : tuple of CloudHeader
-    class_codes : tuple of int
     extent : tuple of float or None
         In units of the CRS.
     zero : LocalFrame

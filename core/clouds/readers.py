@@ -89,10 +89,8 @@ def read_classes(
 
     Parameters
     ----------
-    path : Path
     class_codes : sequence of int
         Classes to keep, 0 to 255.
-    progress : Progress
     extent : tuple of float or (k, 4) array, optional
         Where points are needed, one rectangle or several: those elsewhere may be left out where that saves time, as in
         COPC files.

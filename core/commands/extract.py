@@ -70,13 +70,7 @@ def _run(args: argparse.Namespace) -> int:
 
 
 class _Values(FileValues):
-    """The values of an extraction whose work may be kept, and be done by a cluster.
-
-    Parameters
-    ----------
-    args : Namespace
-    progress : Progress
-    """
+    """The values of an extraction whose work may be kept, and be done by a cluster."""
 
     def __init__(self, args: argparse.Namespace, progress: Progress) -> None:
         super().__init__(JOB, given_to(JOB, args), args.command_line)

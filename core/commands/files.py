@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import replace
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
@@ -17,13 +16,14 @@ from ..clouds.crs import MAX_COORDINATE, is_geographic, parse_crs
 from ..clouds.readers import CATALOGUE, paths_of
 from ..disk import Destination, writing
 from ..errors import CrsError, ParameterError, RailExtractError
+from ..files.rail_rasters import RasterSource, open_with_rasterio
+from ..files.raster_file import write_rasters
 from ..jobs import declaration as kinds
-from ..jobs.clouds import Bounds, CloudSource, checked_crs
+from ..jobs.clouds import Bounds, CloudSource
 from ..jobs.declaration import Job, Parameter
+from ..jobs.outputs import WEB_PAGES
 from ..jobs.result import Result
-from ..jobs.shared import WEB_PAGES
-from ..jobs.values import Rows, Values
-from ..output.raster_file import write_rasters
+from ..jobs.values import Values
 from ..progress import Progress
 from ..run.loop import Runner
 from ..run.processes import workers
@@ -31,11 +31,8 @@ from ..scratch import scratch_folder
 from .options import vector_module
 
 if TYPE_CHECKING:
-    from ..airborne.survey import Guide
-    from ..alignment.placed_axes import PlacedAxes
-    from ..jobs.lines import Lines
+    from ..jobs.features import Source
     from ..jobs.result import Rasters
-    from .vectors import Features
 
 Spell = Callable[[Parameter], str]
 """Returns how a front end names a parameter."""
@@ -49,7 +46,6 @@ class FileValues(Values):
 
     Parameters
     ----------
-    job : Job
     given : mapping of str to object
         Values and files by the name of the parameter or output; None, or none, where one is left empty.
     command : str
@@ -64,7 +60,7 @@ class FileValues(Values):
     """
 
     def __init__(self, job: Job, given: Mapping[str, Any], command: str, keeps: bool = False) -> None:
-        self.job, self._command, self._keeps, self._features = job, command, keeps, dict[str, "Features"]()
+        self.job, self._command, self._keeps, self._read = job, command, keeps, dict[str, Any]()
         self._values = {one.name: read_value(one, given.get(one.name)) for one in job.parameters}
         self._filled = {name for name, one in given.items() if not (one is None or (isinstance(one, str) and not one))}
         named = {one.name: given.get(one.name) for one in job.outputs}
@@ -109,23 +105,6 @@ class FileValues(Values):
         """Provide the runner with as many processes as WORKERS asks for."""
         return workers(self["WORKERS"])
 
-    def system(self, name: str) -> str | None:
-        """Return the coordinate system of a layer as WKT; None if it has none."""
-        return self.features(name).crs_wkt
-
-    def rows(self, name: str, progress: Progress) -> Rows:
-        """Read the fields of a layer."""
-        features = self.features(name)
-        return features.rows(), list(features.columns)
-
-    def lines(self, name: str, progress: Progress) -> Lines:
-        """Read the lines of a layer."""
-        return self.features(name).lines(progress)
-
-    def axes(self, crs_wkt: str | None) -> PlacedAxes:
-        """Read AXIS and what states its kilometres, in a coordinate system."""
-        return vector_module("AXIS", "kilometres").read_axes(self, None, crs_wkt)[0]
-
     @property
     def keeps(self) -> bool:
         """Whether the result stays after the run, so that its layers can be had without naming files."""
@@ -133,10 +112,13 @@ class FileValues(Values):
 
     def cloud(self, name: str = "INPUT") -> CloudSource:
         """Return the files of a cloud, and which of their points count."""
-        source = CloudSource(tuple(paths_of(self[name])), self["CRS"], leave_out=self._values.get("LEAVE_OUT") or ())
-        if not (self.has("MASK") and self.filled("MASK")):
-            return source
-        return replace(source, mask=vector_module("MASK").read_mask(self["MASK"], checked_crs(source)))
+        source = CloudSource(tuple(paths_of(self[name])), self._values.get("CRS"))
+        return self.once(f"cloud {name}", lambda: self.with_mask(source))
+
+    def raster(self, name: str) -> RasterSource:
+        """Return a file of rail rasters."""
+        check_rasterio(name)
+        return RasterSource(Path(self[name]), open_with_rasterio)
 
     def extent(self, crs_wkt: str | None) -> Bounds | None:
         """Return EXTENT, which is in the coordinate system of the cloud."""
@@ -153,24 +135,13 @@ class FileValues(Values):
         with writing(parent), scratch_folder(parent) as folder:
             yield folder
 
-    def lines_along(self, name: str, crs_wkt: str | None) -> list[np.ndarray]:
-        """Read lines that show places along tracks, (k, 2) each, in a coordinate system."""
-        return vector_module(name).read_lines(self[name], crs_wkt)
+    def picked(self, crs_wkt: str | None) -> list[np.ndarray]:
+        """Return the places of SEED, which are in the coordinate system of the cloud."""
+        return [np.array([place]) for place in self["SEED"]]
 
-    def guides(self, name: str, crs_wkt: str | None) -> list[Guide]:
-        """Read such lines with what they state of their tracks."""
-        return vector_module(name).read_guides(self[name], crs_wkt)
-
-    def seeds(self, crs_wkt: str | None) -> list[np.ndarray]:
-        """Read SEEDS and SEED in a coordinate system: points, (1, 2), and lines, (k, 2)."""
-        found = vector_module("SEEDS").read_seeds(self["SEEDS"], crs_wkt) if self.filled("SEEDS") else []
-        return [*found, *(np.array([place]) for place in self._values.get("SEED") or ())]
-
-    def features(self, name: str) -> Features:
-        """Read a layer, once."""
-        if name not in self._features:
-            self._features[name] = vector_module(name).read_features(self[name], name)
-        return self._features[name]
+    def source(self, name: str) -> Source:
+        """Return a layer of a file."""
+        return self.once(name, lambda: vector_module(name).read_features(self[name], name, name == "AXIS"))
 
 
 def run_with_files(job: Job, make: Callable[[], FileValues], progress: Progress, spell: Spell) -> Result:
@@ -178,10 +149,8 @@ def run_with_files(job: Job, make: Callable[[], FileValues], progress: Progress,
 
     Parameters
     ----------
-    job : Job
     make : callable
         Returns the values.
-    progress : Progress
     spell : callable
         Returns how messages name a parameter.
 
@@ -214,7 +183,7 @@ def _failures(result: Result, values: FileValues) -> Iterator[RailExtractError]:
     layers = {name: make() for name, make in result.layers.items() if values.wanted(name)}
     for file in dict.fromkeys(values.destination(name).file for name in layers):
         names = [name for name in layers if values.destination(name).file == file]
-        writing_module = vector_module(names[0], ".output.writing")
+        writing_module = vector_module(names[0], ".files.writing")
         together = [layers[name] for name in names], values.destination(names[0]), result.frame
         writers.append(partial(writing_module.write_layers, *together))
     pages = {name: make for name, make in result.pages.items() if values.wanted(name)}
@@ -349,9 +318,15 @@ def check_packages(one: kinds.Output) -> None:
         A package is not installed.
     """
     if isinstance(one, kinds.LayerOutput):
-        vector_module(one.name, ".output.writing")
-    elif isinstance(one, kinds.RasterOutput) and find_spec("rasterio") is None:
-        raise ParameterError(f"{one.name} needs the package rasterio: in a clone, run pip install .[cluster].")
+        vector_module(one.name, ".files.writing")
+    elif isinstance(one, kinds.RasterOutput):
+        check_rasterio(one.name)
+
+
+def check_rasterio(name: str) -> None:
+    """Check before a run that an input or output can be read or written."""
+    if find_spec("rasterio") is None:
+        raise ParameterError(f"{name} needs the package rasterio: in a clone, run pip install .[cluster].")
 
 
 def destinations_of(job: Job, files: Mapping[str, Path]) -> dict[str, Destination]:

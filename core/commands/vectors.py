@@ -1,11 +1,12 @@
-"""Vector files: lines, points, polygons and tables with their fields, for the commands that take them."""
+"""Vector files as a command line or Python gives them, read with pyogrio and shapely."""
 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,27 +14,27 @@ import numpy as np
 import pyogrio
 import shapely
 
-from ..airborne.survey import Guide, gauge_of
-from ..clouds.crs import import_pyproj, is_geographic, parse_crs, units
-from ..clouds.mask import Mask
-from ..design_places import check_line, check_places
+from ..clouds.crs import import_pyproj, parse_crs
 from ..errors import ParameterError
-from ..jobs.lines import Lines, system_of, without_steps
-from ..progress import Progress
+from ..files.geopackage import geometries_in
+from ..jobs.declaration import LINE, POINT, POLYGON
+from ..jobs.features import Feature, Source
+from ..jobs.lines import Row
 
 LAYER = "|layername="
 """What separates a file from the layer in it, as QGIS writes it."""
 
+KINDS = {"Point": POINT, "LineString": LINE, "Polygon": POLYGON}
+
 
 @dataclass(frozen=True)
-class Features:
-    """Features of a layer.
+class Features(Source):
+    """A layer of a file, as a whole in memory.
 
     Attributes
     ----------
-    option : str
-        Option that named the file, or the file, for messages.
-    crs_wkt : str or None
+    name, crs_wkt
+        See `Source`.
     ids : (n,) int array
     shapes : (n,) object array
         Geometries; None where there is none.
@@ -41,85 +42,93 @@ class Features:
         Values by the name of the field.
     """
 
-    option: str
+    name: str
     crs_wkt: str | None
     ids: np.ndarray
     shapes: np.ndarray
     columns: dict[str, np.ndarray]
 
-    def rows(self) -> list[dict[str, Any]]:
-        """Return the values of each feature; None where a field is empty."""
-        return [
-            {name: _plain(values[number]) for name, values in self.columns.items()} for number in range(len(self.ids))
-        ]
+    @property
+    def fields(self) -> list[str]:  # type: ignore[override]
+        """Names of the fields."""
+        return list(self.columns)
 
-    def lines(self, progress: Progress) -> Lines:
-        """Return the parts of all lines that have a length; see `Lines.of`."""
-        rows = self.rows()
-        parts = ((int(self.ids[n]), rows[n], _vertices(part)) for n, part in self.parts(None, "LineString"))
-        return Lines.of(self.option, parts, list(self.columns), system_of(self.crs_wkt, progress), progress)
+    @property
+    def count(self) -> int:  # type: ignore[override]
+        """Number of features."""
+        return len(self.ids)
 
-    def in_plane(self, crs_wkt: str | None) -> np.ndarray:
-        """Return the geometries in another coordinate system; as they are if either is unknown."""
+    @property
+    def kinds(self) -> Collection[str]:  # type: ignore[override]
+        """Kinds of the geometries; any, where there is no feature."""
+        found = {part.geom_type for part in shapely.get_parts(self.shapes)}
+        return {kind for name, kind in KINDS.items() if name in found or not self.count}
+
+    def rows(self) -> Iterator[tuple[int, Row]]:
+        """Yield number and values of each feature."""
+        for number, feature in enumerate(self.ids):
+            yield int(feature), {name: _plain(values[number]) for name, values in self.columns.items()}
+
+    def features(self, crs_wkt: str | None) -> Iterator[Feature]:
+        """Yield the features in a coordinate system."""
+        change = self._change_to(crs_wkt)
+        for (number, row), shape in zip(self.rows(), self.shapes):
+            with explained(self.name):
+                parts = [(KINDS[part.geom_type], _vertices(part, change)) for part in _parts_of(shape)]
+                own = shapely.get_coordinates(shape)
+            is_lost = bool(np.isfinite(own).all()) and not all(np.isfinite(xyzm[:, :2]).all() for _, xyzm in parts)
+            bounds = np.array([own.min(axis=0), own.max(axis=0)]) if len(own) else own
+            yield Feature(number, row, bounds, parts, is_lost, partial(self._middle, shape, change))
+
+    def _middle(self, shape: shapely.Geometry, change: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+        """Return where a feature counts, (2,)."""
+        with explained(self.name):
+            moved = shapely.transform(shape, change)
+            if "Line" in moved.geom_type:
+                moved = shapely.line_interpolate_point(shapely.line_merge(moved), 0.5, normalized=True)
+            elif "Polygon" in moved.geom_type:
+                moved = shapely.point_on_surface(moved)
+            return np.array(shapely.get_coordinates(shapely.centroid(moved))[0])
+
+    def rings(self, crs_wkt: str | None) -> list[np.ndarray]:
+        """Return the rings of the polygons and of their holes; overlaps count once."""
+        with explained(self.name):
+            moved = shapely.transform(self.shapes, self._change_to(crs_wkt))
+            areas = [part for part in shapely.get_parts(moved) if part.geom_type == "Polygon"]
+            united = shapely.get_parts(shapely.union_all(shapely.make_valid([area for area in areas if area.area > 0])))
+            return [shapely.get_coordinates(ring) for ring in shapely.get_rings(united)]
+
+    def _change_to(self, crs_wkt: str | None) -> Callable[[np.ndarray], np.ndarray]:
+        """Return what moves coordinates, (n, 2), to another system; nothing if it or the layer's is unknown."""
         if not (crs_wkt and self.crs_wkt):
-            return self.shapes
+            return lambda xy: xy
         change = import_pyproj().Transformer.from_crs(parse_crs(self.crs_wkt), parse_crs(crs_wkt), always_xy=True)
-        with explained(self.option):
-            return shapely.transform(self.shapes, lambda xy: np.column_stack(change.transform(*xy.T)))
-
-    def parts(self, crs_wkt: str | None, *kinds: str) -> Iterator[tuple[int, shapely.Geometry]]:
-        """Yield row and geometry of the points, lines or polygons of some kinds, in another coordinate system.
-
-        Those that the system does not cover, and those without a length, are left out.
-        """
-        for number, part in zip(*shapely.get_parts(self.in_plane(crs_wkt), return_index=True)[::-1]):
-            known = not part.is_empty and np.isfinite(shapely.get_coordinates(part)).all()
-            if part.geom_type in kinds and known and (part.geom_type == "Point" or part.length > 0):
-                yield int(number), part
-
-    def checked(self) -> Features:
-        """Return these features if all their coordinates are on the map.
-
-        Raises
-        ------
-        DesignNumberError
-        """
-        unit_m = _unit_m(self.crs_wkt)
-        for feature, bounds in zip(self.ids, shapely.bounds(self.shapes).reshape(-1, 2, 2)):
-            if not np.isnan(bounds).all():
-                check_places(bounds, f"{self.option} (feature {feature})", unit_m)
-        return self
-
-    def guides(self, crs_wkt: str | None) -> Iterator[tuple[int, np.ndarray]]:
-        """Yield row and vertices, (k, 2), of the lines that show places along tracks; see `parts`.
-
-        Raises
-        ------
-        DesignNumberError
-            A line leads to a place that is not on the map.
-        """
-        for number, line in self.checked().parts(crs_wkt, "LineString"):
-            where = f"{self.option} (feature {self.ids[number]})"
-            yield number, check_line(shapely.get_coordinates(line), where, _unit_m(crs_wkt or self.crs_wkt))
+        return lambda xy: np.column_stack(change.transform(*xy.T))
 
 
-def _unit_m(crs_wkt: str | None) -> float:
-    """Return the unit of a coordinate system in plan; that of degrees counts as 1."""
-    crs = parse_crs(crs_wkt) if crs_wkt else None
-    return 1.0 if crs is None or is_geographic(crs) else units(crs)[0]
+def _parts_of(shape: shapely.Geometry | None) -> list[shapely.Geometry]:
+    """Return the points, lines and polygons of a geometry that are not empty."""
+    return [part for part in shapely.get_parts(shape) if part.geom_type in KINDS and not part.is_empty]
 
 
-def read_features(file: str | Path, option: str = "", columns: Sequence[str] | None = None) -> Features:
-    """Read the features of a file; pyogrio drops M values.
+def _vertices(part: shapely.Geometry, change: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+    """Return x, y, z and M of a part, (n, 4), moved; of a polygon, those of its outer ring."""
+    line = part.exterior if part.geom_type == "Polygon" else part
+    xyzm = shapely.get_coordinates(line, include_z=True, include_m=True)
+    return np.column_stack([change(xyzm[:, :2]), xyzm[:, 2:]])
+
+
+def read_features(file: str | Path, name: str, measured: bool = False) -> Features:
+    """Read a layer of a file.
 
     Parameters
     ----------
     file : str or Path
         A vector file; `FILE|layername=NAME` names a layer, else its first one is read.
-    option : str
-        Option that names it, for messages; these else name the file.
-    columns : sequence of str, optional
-        Fields to read, as far as there are any; else all.
+    name : str
+        Of the parameter that names it, for messages.
+    measured : bool
+        Whether M values are needed, which pyogrio drops; those of GeoPackages are read.
 
     Raises
     ------
@@ -129,12 +138,14 @@ def read_features(file: str | Path, option: str = "", columns: Sequence[str] | N
     path, _, layer = str(file).partition(LAYER)
     if Path(path).is_fifo():
         raise ParameterError(f"{path} is a pipe, not a file: give a GeoPackage or GeoJSON file.")
-    with explained(f"{option} {file}".strip()), warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)  # of the M values, which only an axis needs
-        chosen = {"layer": layer or None, "columns": columns}
-        meta, ids, shapes, values = pyogrio.raw.read(Path(path), return_fids=True, **chosen)
+    with explained(f"{name} {file}"), warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # of the M values
+        meta, ids, shapes, values = pyogrio.raw.read(Path(path), layer=layer or None, return_fids=True)
+        if measured and Path(path).suffix.lower() == ".gpkg":
+            stored = geometries_in(Path(path), layer or str(pyogrio.list_layers(path)[0, 0]))
+            shapes = np.array([stored.get(int(number)) for number in ids], dtype=object)
         found = shapely.from_wkb(shapes) if shapes is not None else np.full(len(ids), None)
-    return Features(option or str(file), meta["crs"], ids, found, dict(zip(meta["fields"].tolist(), values)))
+    return Features(name, meta["crs"], ids, found, dict(zip(meta["fields"].tolist(), values)))
 
 
 @contextmanager
@@ -148,87 +159,7 @@ def explained(name: str) -> Iterator[None]:
         ) from error
 
 
-def read_lines(file: Path, crs_wkt: str | None) -> list[np.ndarray]:
-    """Read the lines of a file, (k, 2) each, in a coordinate system; as they are if either is unknown.
-
-    Raises
-    ------
-    ParameterError
-        The file can't be read, or has no lines.
-    """
-    lines = [line for _, line in read_features(file, columns=()).guides(crs_wkt)]
-    if not lines:
-        raise ParameterError(f"{file} has no lines: give lines along the tracks.")
-    return lines
-
-
-def read_guides(file: Path, crs_wkt: str | None) -> list[Guide]:
-    """Read the lines of a file with the name, reference and gauge that it states of them; see `read_lines`.
-
-    Raises
-    ------
-    ParameterError
-        The file can't be read, or has polygons, or no lines.
-    """
-    features = read_features(file, columns=("name", "ref", "gauge"))
-    if any("Polygon" in shape.geom_type for shape in features.shapes if shape is not None):
-        raise ParameterError(f"{file} has polygons: give lines along the tracks, one for each.")
-    rows = features.rows()
-    guides = [
-        Guide(
-            int(features.ids[number]),
-            line,
-            gauge_of(rows[number].get("gauge")),
-            *(_word(rows[number].get(name)) for name in ("name", "ref")),
-        )
-        for number, line in features.guides(crs_wkt)
-    ]
-    if not guides:
-        raise ParameterError(f"{file} has no lines: give lines along the tracks.")
-    return guides
-
-
-def read_seeds(file: Path, crs_wkt: str | None) -> list[np.ndarray]:
-    """Read the points, (1, 2) each, and the lines, (k, 2) each, of a file; see `read_lines`.
-
-    Raises
-    ------
-    ParameterError
-        The file can't be read, or has neither points nor lines.
-    """
-    features = read_features(file, columns=())
-    points = [shapely.get_coordinates(seed) for _, seed in features.checked().parts(crs_wkt, "Point")]
-    seeds = [*points, *(line for _, line in features.guides(crs_wkt))]
-    if not seeds:
-        raise ParameterError(f"{file} has neither points nor lines: give places on railheads.")
-    return seeds
-
-
-def read_mask(file: Path, crs_wkt: str | None) -> Mask:
-    """Read the polygons of a file, of which overlaps count once; see `read_lines`.
-
-    Raises
-    ------
-    ParameterError
-        The file can't be read, or has no polygons.
-    """
-    areas = [area for _, area in read_features(file, columns=()).checked().parts(crs_wkt, "Polygon") if area.area > 0]
-    if not areas:
-        raise ParameterError(f"{file} has no polygons: give polygons around the tracks.")
-    with explained(str(file)):
-        united = shapely.get_parts(shapely.union_all(shapely.make_valid(areas)))
-    return Mask.of([shapely.get_coordinates(ring) for ring in shapely.get_rings(united)])
-
-
-def _vertices(line: shapely.LineString) -> np.ndarray:
-    return without_steps(shapely.get_coordinates(line, include_z=True))
-
-
 def _plain(value: Any) -> Any:
     """Return a value of a field; None where it is empty."""
     value = value.item() if isinstance(value, np.generic) else value
     return None if value is None or value != value else value
-
-
-def _word(value: Any) -> str:
-    return "" if value is None else str(value)

@@ -60,6 +60,8 @@ class SurveyedLine:
         Standard errors across and in height; NaN where they are unknown.
     is_rail : bool
         Whether it may be one of the two rails of a track; else it is a centerline.
+    name : str
+        What the report calls it.
     """
 
     number: int
@@ -67,6 +69,7 @@ class SurveyedLine:
     sigma_m: float = np.nan
     sigmaz_m: float = np.nan
     is_rail: bool = True
+    name: str = ""
 
 
 @dataclass(frozen=True)
@@ -108,6 +111,8 @@ class LineDifferences:
     ----------
     line_id : int
         Of the reference; of the other survey where the state is "extra".
+    name : str
+        Of this line.
     state : object
         "both" or "missing" at stations of a line of the reference; of a line of the other survey "extra", or empty
         where the reference has it.
@@ -132,6 +137,7 @@ class LineDifferences:
     """
 
     line_id: int
+    name: str
     state: np.ndarray
     input_id: np.ndarray
     xyz: np.ndarray
@@ -154,6 +160,12 @@ class LineDifferences:
         unknown = {one.name: np.full(len(t), np.nan) for one in fields(cls) if one.name.endswith("_mm")}
         moved = np.zeros(len(t), dtype=bool)
         return cls(xyz=places, left=left, chainage_m=t, moved=moved, **{**unknown, **known})
+
+    @property
+    def shifted(self) -> np.ndarray:
+        """Whether the constant shift alone exceeds `SURE` standard errors, (n,) bool."""
+        across, up = np.abs(self.shift_mm) > SURE * self.sigma_mm, np.abs(self.shiftz_mm) > SURE * self.sigmaz_mm
+        return across | up
 
     @property
     def cells_m(self) -> np.ndarray:
@@ -181,11 +193,14 @@ class TrackComparison:
         One for each line of the reference, then one for each line of the other survey with extra lengths.
     estimated_m : float
         Standard error across that the scatter of the differences shows, where lines state none; NaN otherwise.
+    counts_shift : bool
+        Whether the constant shift counts as a movement.
     """
 
     lines: tuple[LineDifferences, ...]
     shift: Shift
     estimated_m: float
+    counts_shift: bool
 
     def length_of(self, state: str) -> float:
         """Return the length in a state, metres."""
@@ -245,7 +260,8 @@ def compare_surveys(
         _extra(line, number, chords, settings, progress)
         for number, line in enumerate(progress.span(0.8, 1).follow(other.lines))
     ]
-    return TrackComparison((*lines, *filter(None, extra)), shift, scatter_m[0] if estimated else np.nan)
+    estimate_m = scatter_m[0] if estimated else np.nan
+    return TrackComparison((*lines, *filter(None, extra)), shift, estimate_m, not settings.ignore_shift)
 
 
 def _stations(line: np.ndarray, step_m: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -303,6 +319,7 @@ def _compare(
     return LineDifferences.at(
         (t, places, left),
         line_id=line.number,
+        name=line.name,
         state=np.where(found < 0, MISSING, BOTH).astype(object),
         input_id=ids,
         across_mm=1000 * np.sum(step[:, :2] * left, axis=1),
@@ -364,6 +381,7 @@ def _extra(
     return LineDifferences.at(
         (t, places, left),
         line_id=line.number,
+        name=line.name,
         state=np.where(found < 0, EXTRA, "").astype(object),
         input_id=np.full(len(t), line.number, dtype=object),
     )

@@ -25,10 +25,8 @@ class Ahead:
     Attributes
     ----------
     xy : (2,) array
-    z : float
     heading : (2,) array
         Unit vector.
-    curvature, grade : float
     """
 
     xy: np.ndarray
@@ -65,7 +63,6 @@ def lead(xyz: np.ndarray, step_m: float, heading: np.ndarray, beam: Beam) -> Ahe
         Distance beyond the last one.
     heading : (2,) array
         Unit vector, roughly along the course.
-    beam : Beam
     """
     end = xyz[-1]
     step = xyz[:, :2] - end[:2]

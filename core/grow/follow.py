@@ -70,7 +70,6 @@ class Window:
         The rail; None where it was not seen.
     other_xyz : (3,) array
         On the axis of the other rail.
-    other : Head or None
     """
 
     xyz: np.ndarray
@@ -103,17 +102,12 @@ class _Track:
 def follow(
     points: OnHeads, start: Start, behind: np.ndarray, settings: GrowSettings, progress: Progress = SILENT
 ) -> tuple[list[Window], Reason]:
-    """Follow a rail in one direction.
+    """Follow a rail in one direction, from a start that was `turned` to it.
 
     Parameters
     ----------
-    points : OnHeads
-    start : Start
-        In this direction; see `turned`.
     behind : (n, 3) array
         Places on the axis up to where it begins, in order.
-    settings : GrowSettings
-    progress : Progress
 
     Returns
     -------

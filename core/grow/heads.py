@@ -57,7 +57,6 @@ class Rail:
         Its axis on the top of the head, a place for each window from the first one in which it was seen to the last.
     seen : (k,) bool array
         Windows in which it was seen.
-    beam : Beam
     """
 
     xyz: np.ndarray
@@ -79,9 +78,6 @@ def heads_in(
     ----------
     across_m, height_m : (n,) arrays
         Points on heads: places across and heights.
-    settings : GrowSettings
-    beam : Beam
-    least : float
     """
     order = np.argsort(across_m, kind="stable")
     across_m, height_m = across_m[order], height_m[order]
@@ -127,7 +123,6 @@ class OnHeads:
     ----------
     read : callable
         Returns the points, (n, 3) metres, of the square of the classification in a column and row, with its margin.
-    settings : GrowSettings
     """
 
     def __init__(self, read: Callable[[Key], np.ndarray], settings: GrowSettings) -> None:

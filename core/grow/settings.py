@@ -74,13 +74,7 @@ BLUNT = replace(THIN, below_m=classify.BLUNT.below_m, above_m=classify.BLUNT.abo
 
 @dataclass(frozen=True)
 class GrowSettings:
-    """What the user chooses.
-
-    Attributes
-    ----------
-    gauge_m, head_width_m : float
-    parameters : GrowParameters
-    """
+    """What the user chooses."""
 
     gauge_m: float
     head_width_m: float

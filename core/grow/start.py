@@ -48,7 +48,6 @@ class Start:
         Places on its axis, in order.
     heading : (2,) array
         Unit vector along it.
-    beam : Beam
     per_m : float
         Points on the head per metre.
     side : int

@@ -147,7 +147,7 @@ def _means(points: HeadPoints) -> tuple[np.ndarray, np.ndarray]:
 def _of_ridge(points: HeadPoints, ridge: Ridge) -> Shown:
     """Return what points show of a blunt head: its crest."""
     outline = Middles.unknown(len(ridge.t))
-    return Shown(ridge.t, points.per_station(), ridge.offset_m, ridge.information, np.zeros(len(ridge.t)), outline)
+    return Shown(ridge.t, points.per_station(), ridge.offset_m, ridge.information, ridge.common_m, outline)
 
 
 def _is_narrow(points: HeadPoints) -> bool:

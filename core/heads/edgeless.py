@@ -45,6 +45,18 @@ The line itself follows curves; only its offsets are averaged."""
 MIN_BEND = 0.5
 """Least bend of the parabola, 1/m: a radius of 2 m. A flatter top has no crest."""
 
+CREST_SIGMA_M = 0.003
+"""Standard error of a crest that more points would not reduce: a blur of 4 cm blends a head with ballast that is higher
+by 2 or 3 cm on one side, and an oblique beam with what it sees on its own side of the rail."""
+
+MAX_TILT = 0.06
+"""Slope across of a track that is not known because its other rail is not seen: cant of 90 mm. It moves a crest."""
+
+CREST_BELOW_M = 0.02
+"""Distance of the crest of a blurred head below its top, give or take as much: a beam of half a head lowers it by some
+millimetres, a blur of 4 cm by 4 cm. Where a track has cant, the rail leans, and the crest lies to the side of the top.
+"""
+
 LEANING_M = 0.008
 """Standard deviation of the mean of the points about the crest: labels lean to the side on which the bed is higher.
 Where noise hides the crest, the mean says more."""
@@ -113,11 +125,14 @@ class Ridge:
     offset_m, information : (s,) arrays
         Offset of the crest to the left of the line that the points next to a station alone show, and the inverse of its
         variance by the noise of single points, 1/m²; 0 where no points are near.
+    common_m : (s,) array
+        Standard error of the crest that more points would not reduce.
     """
 
     t: np.ndarray
     offset_m: np.ndarray
     information: np.ndarray
+    common_m: np.ndarray
 
     @classmethod
     def find(cls, points: HeadPoints) -> Ridge | None:
@@ -126,7 +141,8 @@ class Ridge:
         if not points.is_blunt or not len(near.t):
             return None
         row, rows = near.station, len(near.stations)
-        x, up = near.across, near.z - rough_level(near.t, near.z)
+        tilt = np.full(rows, np.nan) if near.tilt is None else near.tilt
+        x, up = _upright(near.across, near.z - rough_level(near.t, near.z), np.nan_to_num(tilt)[row])
         used = np.ones(len(x), dtype=bool)
         for _ in range(SLOPE_ROUNDS):
             bend = max(-2 * float(np.polynomial.polynomial.polyfit(x[used], up[used], 2)[2]), MIN_BEND)
@@ -134,7 +150,13 @@ class Ridge:
             noise_m = robust_sigma(flat[used])
             level, slope, crest, information = _crests(row[used], rows, x[used], flat[used], bend, noise_m)
             used = np.abs(flat - level[row] - slope[row] * x) <= OFF_TOP_SIGMAS * noise_m
-        return cls(near.stations, crest, information)
+        unsure_m = np.where(np.isnan(tilt), MAX_TILT / bend, CREST_BELOW_M * np.abs(tilt))
+        return cls(near.stations, crest, information, np.hypot(CREST_SIGMA_M, unsure_m))
+
+
+def _upright(left: np.ndarray, up: np.ndarray, tilt: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Turn points about their top, by offsets and heights, (n,) each, as if the track did not rise to the left."""
+    return left + tilt * (up - CREST_BELOW_M), up - tilt * left
 
 
 def _crests(

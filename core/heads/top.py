@@ -42,6 +42,10 @@ PROFILE_BIN_M = 0.25
 TAIL_M = 1.0
 """Length over which a profile is extrapolated with the slope at its end; beyond it is level."""
 
+BLENDED_M = 0.002
+"""Standard error of the height of a blunt head: a beam that is as wide as it blends it with what is below, which lowers
+its crest by 1 to 5 mm."""
+
 LEAST_INFORMATION = 1e-6
 """Information about level, slope and fall of a crown that is always there, so that few points are enough."""
 
@@ -56,11 +60,14 @@ class Crown:
         Fall per square of the distance, and its standard error, 1/m.
     rim_m : float
         Distance from the axis up to which the top falls.
+    level_m : float
+        Standard error of the level of the top that more points would not reduce.
     """
 
     bend: float
     sigma: float
     rim_m: float
+    level_m: float = 0.0
 
     def fall(self, across: np.ndarray) -> np.ndarray:
         """Return how far points are lower than the axis of their head because they are beside it, (n,) metres."""
@@ -68,7 +75,7 @@ class Crown:
 
     def error(self, head_width_m: float) -> float:
         """Return the standard error of the height on the axis, metres, from points up to `AXIS_SHARE` beside it."""
-        return self.sigma * (AXIS_SHARE * head_width_m) ** 2 / 3
+        return float(np.hypot(self.sigma * (AXIS_SHARE * head_width_m) ** 2 / 3, self.level_m))
 
 
 @dataclass(frozen=True)
@@ -171,7 +178,7 @@ def fit_crown(points: HeadPoints) -> Crown:
         found = covariance @ (powers[used].T @ above[used] / noise_m**2 - expected * usual)
         off = above - powers @ found
         used = np.abs(off) <= OFF_TOP_SIGMAS * robust_sigma(off)
-    return Crown(max(-found[2], 0.0), float(np.sqrt(covariance[2, 2])), rim_m)
+    return Crown(max(-found[2], 0.0), float(np.sqrt(covariance[2, 2])), rim_m, BLENDED_M if points.is_blunt else 0.0)
 
 
 def smoothed(t: np.ndarray, z: np.ndarray, smoothing_m: float | None, prior: Prior = SHARP) -> Course:

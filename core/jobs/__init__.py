@@ -42,5 +42,5 @@ JOBS = tuple(
 )
 """The whole extraction first, then its steps in order."""
 
-CALLS = {job.call: job for job in JOBS if job.call}
+CALLS = {job.call: job for job in JOBS}
 """The jobs of the command line and of Python, by their name."""

@@ -6,11 +6,11 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from ..errors import ParameterError
-from ..fields import AIRBORNE, PROPOSED
+from ..fields import AIRBORNE
 from ..parameters import AIRBORNE_CLASSES, AirborneParameters
 from ..progress import Estimating
 from ..standards import SEARCHED_CLASSES
-from . import shared
+from . import outputs, shared
 from .declaration import (
     CLOUD_NEEDS,
     CLOUD_WORDS,
@@ -27,7 +27,6 @@ from .declaration import (
 from .values import class_numbers
 
 if TYPE_CHECKING:
-    from ..airborne.proposals import Proposals
     from ..airborne.survey import Survey
     from ..progress import Progress
     from .result import Result
@@ -36,15 +35,19 @@ if TYPE_CHECKING:
 MAX_GUIDE_REACH_M, MAX_FOOTPRINT_M, MAX_RAIL_M = 6.0, 2.0, 0.5
 """Beyond, a guide means another track, a footprint covers both rails, and a rail is not a rail."""
 
+NOT_PROPOSED = "Guides are not proposed: draw them, or import them, such as railway=rail of OpenStreetMap."
+"""What the output PROPOSED means: a search of the whole cloud found too few tracks and too many that are none."""
+
 
 def _check(values: Values) -> None:
-    """Check the rail, the classes and the guides, and that there are some or are to be some."""
+    """Check the rail, the classes and the guides."""
     values.airborne(values.standard())
     _class_codes(values)
-    if values.filled("GUIDE"):
-        values.guides("GUIDE", values.cloud_crs())
-    elif not values.wanted("PROPOSED") and not values.keeps:
-        raise ParameterError("GUIDE is empty: choose lines along the tracks, or PROPOSED to have some proposed.")
+    if not values.filled("GUIDE"):
+        raise ParameterError(
+            "GUIDE is empty: draw lines along the tracks, or import them, such as railway=rail of OpenStreetMap."
+        )
+    values.guides("GUIDE", values.cloud_crs())
 
 
 def _class_codes(values: Values) -> tuple[int, ...]:
@@ -54,42 +57,30 @@ def _class_codes(values: Values) -> tuple[int, ...]:
 
 
 def _run(values: Values, progress: Progress) -> Result:
-    """Fit the tracks, or propose guides where there are none."""
+    """Fit the tracks along the guides."""
     from ..airborne.files import survey_files
-    from ..airborne.proposals import propose_guides
-    from ..airborne.run import Run
+    from ..airborne.reading import Run
     from .result import ShownCloud
 
     progress, standard, codes = Estimating(progress), values.standard(), _class_codes(values)
+    if values.wanted("PROPOSED"):
+        progress.warning(NOT_PROPOSED)
     request = values.request(codes, progress)
     with values.runner() as runner, values.scratch() as folder:
         run = Run(request, values.airborne(standard), folder / "points", runner, progress)
-        if values.filled("GUIDE"):
-            made = _fitted(survey_files(run, values.guides("GUIDE", values.cloud_crs())), values)
-        else:
-            made = _proposed(propose_guides(run))
+        made = _fitted(survey_files(run, values.guides("GUIDE", values.cloud_crs())), values)
     return replace(made, cloud=ShownCloud("INPUT", codes, standard.head_width_m))
-
-
-def _proposed(found: Proposals) -> Result:
-    """Return the proposed guides as a result."""
-    from ..output.layers import lines_layer
-    from .result import Result
-
-    figures = {"PROPOSED_LENGTH": found.length_m, "DENSITY": round(found.density, 1)}
-    layers = {"PROPOSED": lambda: lines_layer(PROPOSED, found.guides)}
-    return Result(figures, found.frame, layers, sentences=(found.summary,))
 
 
 def _fitted(survey: Survey, values: Values) -> Result:
     """Return what was found along the guides as a result."""
-    from ..output.layers import airborne_stations_layer, findings_layer, lines_layer
+    from ..files.layers import airborne_stations_layer, findings_layer, lines_layer
     from ..report.airborne import airborne_findings, airborne_page, airborne_summary
     from .result import Result
 
     facts = {"Rail": values.standard().label, "Command": values.command}
     figures: dict[str, Any] = {
-        **shared.figures_of(survey.lines, "CENTERLINE"),
+        **outputs.figures_of(survey.lines, "CENTERLINE"),
         "GUIDE_LENGTH": survey.guides_m,
         "SEEN_LENGTH": survey.seen_m,
         "DENSITY": round(survey.density, 1),
@@ -114,9 +105,7 @@ JOB = Job(
     "For the clouds of national surveys, with 5 to 100 points per square metre, which show no single railheads; "
     "for mobile lidar, use Extract Rails.\n\n"
     "A line ends where the track is not seen for more than 30 m; the stations state why. The standard error "
-    "leaves out that of the flight against its datum, often 3 to 10 cm.\n\n"
-    "Without a guide, the whole cloud is searched, in minutes per square kilometre. Correct the guides that are "
-    "proposed, and run again with them.",
+    "leaves out that of the flight against its datum, often 3 to 10 cm.",
     (*RAIL_WORDS, *CLOUD_WORDS, *TRACK_WORDS, "airborne", "ALS", "national", "OpenStreetMap", "centerline"),
     CLOUD_NEEDS,
     (
@@ -132,7 +121,7 @@ JOB = Job(
         replace(
             shared.GUIDE,
             help="One line for each track of the railway, such as railway=rail of OpenStreetMap, up to 3 m off. Give "
-            "every track its guide: they are fitted together. Leave empty to have guides proposed.",
+            "every track its guide: they are fitted together.",
             advanced=False,
         ),
         *shared.RAIL,
@@ -167,7 +156,7 @@ JOB = Job(
     ),
     (
         replace(
-            shared.CENTERLINES_OUTPUT,
+            outputs.CENTERLINES_OUTPUT,
             help="Lines in the middle of the tracks at the top of the rails, where they are seen, with standard "
             "errors.",
         ),
@@ -180,23 +169,23 @@ JOB = Job(
             optional=True,
             kind=POINT,
         ),
-        shared.FINDINGS_OUTPUT,
+        outputs.FINDINGS_OUTPUT,
         LayerOutput(
             "PROPOSED",
             "Proposed guides",
-            "Only where GUIDE is empty: lines along which tracks seem to lie, with a score. Delete or move what is "
-            "wrong, add what is missing, and run again with this layer as GUIDE.",
+            NOT_PROPOSED,
             advanced=True,
             optional=True,
+            on_demand=True,
         ),
-        shared.REPORT,
+        outputs.REPORT,
     ),
     (
-        *shared.CENTERLINE_FIGURES,
+        *outputs.CENTERLINE_FIGURES,
         Figure("GUIDE_LENGTH", "Length of the guides [m]"),
         Figure("SEEN_LENGTH", "Length on which tracks are seen [m]"),
         Figure("DENSITY", "Points per square metre along the guides"),
-        Figure("PROPOSED_LENGTH", "Length of the proposed guides [m]"),
+        Figure("PROPOSED_LENGTH", "Length of the proposed guides [m]: never stated, because none are proposed"),
     ),
     RAW_CLOUDS,
     picture="gauge.svg",

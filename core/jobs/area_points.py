@@ -15,7 +15,7 @@ from .clouds import Bounds, BoundsIn, CloudSource, crs_of, read_points, spool_po
 from .reading import check_same_plane
 
 if TYPE_CHECKING:
-    from ..squares.spool import SpooledPoints
+    from ..tiles.spool import SpooledPoints
 
 Points = TypeVar("Points", RailPoints, "SpooledPoints")
 
@@ -28,10 +28,8 @@ class Area:
     ----------
     what : str
         What covers the area, for messages: "raster" or "rails".
-    class_codes : tuple of int
     bounds : tuple of float
         Smallest x, smallest y, largest x, largest y, in units of the coordinate system.
-    frame : LocalFrame
     """
 
     what: str
@@ -44,12 +42,6 @@ def read_points_in(area: Area, cloud: CloudSource, progress: Progress) -> dict[i
     """Read the points of an area, by class, all in one local frame.
 
     If the cloud or the area states no coordinate system, that of the other is used.
-
-    Parameters
-    ----------
-    area : Area
-    cloud : CloudSource
-    progress : Progress
 
     Raises
     ------
@@ -68,8 +60,6 @@ def spool_points_in(
 
     Parameters
     ----------
-    area, cloud, progress
-        See `read_points_in`.
     side_m : float
         Side of the squares.
     folder : Path

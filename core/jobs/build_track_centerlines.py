@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ..fields import CENTERLINES, RAILS
-from . import shared
+from . import outputs, shared
 from .declaration import LINE_NEEDS, RAIL_WORDS, STEPS, TRACK_WORDS, Job, LayerInput
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ def _check(values: Values) -> None:
 def _run(values: Values, progress: Progress) -> Result:
     """Pair the rails of each class."""
     from ..checks.lines import with_tracks
-    from ..output.layers import lines_layer
+    from ..files.layers import lines_layer
     from ..tracks.centerlines import tracks_of
     from .result import Result
 
@@ -38,7 +38,7 @@ def _run(values: Values, progress: Progress) -> Result:
         "OUTPUT": lambda: lines_layer(CENTERLINES, tracks),
         "RAILS": lambda: lines_layer(RAILS, with_tracks(rails, tracks, progress)),
     }
-    return Result(shared.figures_of(tracks, "CENTERLINE"), lines.frame, layers)
+    return Result(outputs.figures_of(tracks, "CENTERLINE"), lines.frame, layers)
 
 
 JOB = Job(
@@ -65,10 +65,10 @@ JOB = Job(
         shared.MIN_LENGTH,
     ),
     (
-        replace(shared.CENTERLINES_OUTPUT, name="OUTPUT", optional=False),
-        replace(shared.RAILS_OUTPUT, on_demand=True),
+        replace(outputs.CENTERLINES_OUTPUT, name="OUTPUT", optional=False),
+        replace(outputs.RAILS_OUTPUT, on_demand=True),
     ),
-    shared.CENTERLINE_FIGURES,
+    outputs.CENTERLINE_FIGURES,
     STEPS,
     picture="gauge.svg",
     call="build_track_centerlines",

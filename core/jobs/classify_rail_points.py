@@ -8,7 +8,7 @@ from ..errors import ParameterError
 from ..parameters import DEFAULT_GUIDE_DISTANCE_M, Parameters
 from ..progress import Estimating
 from ..standards import SEARCHED_CLASSES
-from . import shared
+from . import outputs, shared
 from .declaration import CLOUD_NEEDS, CLOUD_WORDS, RAIL_WORDS, RAW_CLOUDS, Flag, Job, Number
 
 if TYPE_CHECKING:
@@ -126,8 +126,8 @@ JOB = Job(
         ),
         shared.WORKERS,
     ),
-    shared.CLASSIFIED,
-    shared.CLASSIFIED_FIGURES,
+    outputs.CLASSIFIED,
+    outputs.CLASSIFIED_FIGURES,
     RAW_CLOUDS,
     picture="gauge.svg",
     call="classify",

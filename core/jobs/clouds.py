@@ -14,7 +14,7 @@ from ..standards import RAIL_CLASS
 if TYPE_CHECKING:
     from ..clouds.mask import Mask
     from ..clouds.points import RailPoints, Request
-    from ..squares.spool import SpooledPoints
+    from ..tiles.spool import SpooledPoints
 
 Bounds = tuple[float, float, float, float]
 """Smallest x, smallest y, largest x, largest y."""
@@ -56,10 +56,6 @@ def request_points(
 
     Parameters
     ----------
-    source : CloudSource
-    class_codes : sequence of int
-    bounds : callable
-    progress : Progress
     unreadable : list of str, optional
         Gets what is wrong with files that can't be read; without it, one ends the run.
     """
@@ -80,14 +76,11 @@ def read_points(
 
     Parameters
     ----------
-    source : CloudSource
-    class_codes : sequence of int
     bounds : callable
         Returns the extent to read, given the cloud's coordinate system.
-    progress : Progress
     """
+    from ..clouds.on_heads import heads_of
     from ..clouds.points import read_requested
-    from ..heads.on_heads import heads_of
 
     found = read_requested(request_points(source, class_codes, bounds, progress), progress)
     return tuple(heads_of(points) for points in found)
@@ -105,14 +98,12 @@ def spool_points(
 
     Parameters
     ----------
-    source, class_codes, bounds, progress
-        See `read_points`.
     side_m : float
         Side of the squares.
     folder : Path
         Where to write them.
     """
-    from ..squares.spool import spool
+    from ..tiles.spool import spool
 
     return spool(request_points(source, class_codes, bounds, progress), side_m, folder, progress)
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import ParameterError
 from ..fields import DIFFERENCE_FIELDS
 from ..parameters import ComparisonParameters
-from . import shared
+from . import outputs, shared
 from .declaration import (
     ALIGNMENT,
     LINE_NEEDS,
@@ -69,15 +69,14 @@ def _check(values: Values) -> None:
 def _run(values: Values, progress: Progress) -> Result:
     """Read both surveys and compare them."""
     from ..comparison.tracks import compare_surveys, doubts_of
-    from ..output.layers import differences_layer
+    from ..files.layers import differences_layer
     from ..report.comparison import build_comparison, describe_shift, verdict_on
     from .result import Result
 
     earlier, later = progress.span(0, READING).split(2)
     reference, frame = _survey(values, "REFERENCE", None, earlier)
     other, _ = _survey(values, "INPUT", frame, later)
-    ignored = values["IGNORE_SHIFT"]
-    settings = ComparisonParameters(values["REACH"], values["STEP"], ignored)
+    settings = ComparisonParameters(values["REACH"], values["STEP"], values["IGNORE_SHIFT"])
     found = compare_surveys(reference, other, settings, progress.span(READING, COMPARING))
     progress.check()
     for sentence in doubts_of(found):
@@ -88,7 +87,7 @@ def _run(values: Values, progress: Progress) -> Result:
         _figures(found),
         frame,
         {"OUTPUT": lambda: differences_layer(found)},
-        {"REPORT": lambda: build_comparison(found, not ignored, source, facts)},
+        {"REPORT": lambda: build_comparison(found, source, facts)},
         (verdict_on(found), describe_shift(found)),
         found=found,
     )
@@ -199,7 +198,7 @@ JOB = Job(
             optional=True,
             kind=POINT,
         ),
-        replace(shared.REPORT, help="A web page with what has moved, the constant shift and the distribution."),
+        replace(outputs.REPORT, help="A web page with what has moved, the constant shift and the distribution."),
     ),
     (
         Figure("COMPARED_LENGTH", "Length on lines of both surveys [m]"),

@@ -44,7 +44,6 @@ class Parameter:
         As models, batch files and scripts know it, in capitals; it never changes.
     label : str
         As a dialog shows it, with the unit.
-    help : str
     advanced : bool
         Whether a dialog shows it on demand only.
     optional : bool
@@ -248,7 +247,6 @@ class Job:
         Python modules that it needs: of each inner tuple one is enough, and the first is recommended.
     parameters, outputs, figures : tuple
         In the order of the interface.
-    group : Group
     fields : tuple of Field
         Fields of the main result, for the help on the command line.
     picture : str
@@ -258,7 +256,7 @@ class Job:
     pages : tuple of str
         Pages of the guide to which the help links.
     call : str
-        Name as a function of Python, and with hyphens as a command; empty if there is none yet.
+        Name as a function of Python, and with hyphens as a command; empty for what sets up QGIS.
     check : callable
         Checks the values before a run, in the main thread; it raises a `RailExtractError`.
     run : callable

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from .. import VERSION
-from . import shared
+from . import outputs, shared
 from .declaration import (
     ALIGNMENT,
     ALIGNMENT_WORDS,
@@ -32,7 +32,7 @@ CIRCLES, PARABOLAS = VERTICAL_CURVES = ("CIRCLES", "PARABOLAS")
 
 def _check(values: Values) -> None:
     """Check the rail and the name of the file."""
-    from ..output.design_files import check_format
+    from ..files.design_files import check_format
 
     values.standard()
     values.prepare(values.system("INPUT") or values["CRS"])
@@ -41,7 +41,7 @@ def _check(values: Values) -> None:
 
 def _run(values: Values, progress: Progress) -> Result:
     """Read the table, check it and write the file."""
-    from ..output.design_files import check_designs, left_out, write_designs
+    from ..files.design_files import check_designs, left_out, write_designs
     from .reading import read_elements
     from .result import Result
 
@@ -100,7 +100,7 @@ JOB = Job(
             kinds="LandXML files (*.xml);;IFC files (*.ifc);;DXF files (*.dxf)",
         ),
     ),
-    shared.ALIGNMENT_FIGURES,
+    outputs.ALIGNMENT_FIGURES,
     ALIGNMENT,
     picture="alignment.svg",
     guide="alignment_files",

@@ -10,7 +10,7 @@ from ..frpdf.models import choose as choose_model
 from ..parameters import LEARNED, STRIPS, Parameters
 from ..progress import Estimating
 from ..standards import DEFAULT, SEARCHED_CLASSES
-from . import shared
+from . import outputs, shared
 from .declaration import CLOUD_NEEDS, CLOUD_WORDS, RAIL_WORDS, TRACK_WORDS, Choice, Flag, Job, RasterOutput
 
 if TYPE_CHECKING:
@@ -115,14 +115,14 @@ def _run(values: Values, progress: Progress) -> Result:
 
 def _result(values: Values, network: RailNetwork, origin: Origin) -> Result:
     """Return what was extracted as a result."""
-    from ..output.layers import network_makers
-    from ..report import summary
+    from ..checks.listing import summary
+    from ..files.layers import network_makers
     from .result import Result, ShownCloud
 
     figures: dict[str, Any] = {
-        **shared.figures_of(network.rails, "RAIL"),
-        **shared.figures_of(network.centerlines, "CENTERLINE"),
-        **(shared.figures_of_stations(network.geometry) if _measures(values) else {}),
+        **outputs.figures_of(network.rails, "RAIL"),
+        **outputs.figures_of(network.centerlines, "CENTERLINE"),
+        **(outputs.figures_of_stations(network.geometry) if _measures(values) else {}),
         "ENGINE_USED": network.engine,
     }
     return Result(
@@ -139,7 +139,7 @@ def _result(values: Values, network: RailNetwork, origin: Origin) -> Result:
 
 def _cleaned(values: Values, network: RailNetwork, standard: RailStandard) -> Rasters | None:
     """Return the network's output as Clean Rail Raster writes it; None if no rail cell is left."""
-    from ..output.raster_file import header_for, on_one_grid
+    from ..files.raster_file import header_for, on_one_grid
 
     if not any(raster.tiles for raster in network.cleaned):
         return None
@@ -208,10 +208,10 @@ JOB = Job(
         *shared.axis(optional=True),
     ),
     (
-        shared.RAILS_OUTPUT,
-        replace(shared.CENTERLINES_OUTPUT, advanced=True),
-        replace(shared.QUALITY_OUTPUT, advanced=True, on_demand=True),
-        shared.FINDINGS_OUTPUT,
+        outputs.RAILS_OUTPUT,
+        replace(outputs.CENTERLINES_OUTPUT, advanced=True),
+        replace(outputs.QUALITY_OUTPUT, advanced=True, on_demand=True),
+        outputs.FINDINGS_OUTPUT,
         RasterOutput(
             "CLEANED",
             "Cleaned rail raster",
@@ -220,9 +220,9 @@ JOB = Job(
             optional=True,
             on_demand=True,
         ),
-        shared.REPORT,
+        outputs.REPORT,
     ),
-    (*shared.RAIL_FIGURES, *shared.CENTERLINE_FIGURES, *shared.QUALITY_FIGURES, shared.ENGINE_USED),
+    (*outputs.RAIL_FIGURES, *outputs.CENTERLINE_FIGURES, *outputs.QUALITY_FIGURES, outputs.ENGINE_USED),
     picture="gauge.svg",
     pages=("parameters", "tutorial", "limits", "troubleshooting"),
     call="extract",

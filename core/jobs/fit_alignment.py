@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from ..parameters import TRANSITIONS, FitParameters
-from . import shared
+from . import outputs, shared
 from .declaration import (
     ALIGNMENT,
     LINE_NEEDS,
@@ -49,7 +49,7 @@ def _run(values: Values, progress: Progress) -> Result:
     """Fit each track."""
     from ..alignment.fit import fit_tracks
     from ..fields import DEVIATIONS
-    from ..output.layers import elements_layer, stations_layer
+    from ..files.layers import elements_layer, stations_layer
     from ..progress import Recording
     from ..report import build_alignment_page
     from .reading import read_elements, read_tracks
@@ -82,7 +82,7 @@ def _figures(fits: Sequence[Fit]) -> dict[str, Any]:
     """Return the number of elements, and the root mean squares of slews, lifts and differences of cant, millimetres."""
     import numpy as np
 
-    from ..report.markup import rms
+    from ..checks.findings import rms
 
     found = {
         figure: rms(np.concatenate([getattr(fit.deviations, name) for fit in fits]))
@@ -94,7 +94,7 @@ def _figures(fits: Sequence[Fit]) -> dict[str, Any]:
 
 def _in_words(deviations: Deviations) -> str:
     """Return the root mean squares of a track, each with its direction; unknown ones are left out."""
-    from ..report.markup import rms
+    from ..checks.findings import rms
 
     found = ((rms(getattr(deviations, name)), where) for name, where in DIRECTIONS.values())
     return ", ".join(f"{one:.2f} mm {where}" for one, where in found if not math.isnan(one))
@@ -172,7 +172,7 @@ JOB = Job(
             kinds=(TABLE,),
         ),
     ),
-    (shared.ELEMENTS_OUTPUT, shared.DEVIATIONS_OUTPUT, shared.ALIGNMENT_REPORT),
+    (outputs.ELEMENTS_OUTPUT, outputs.DEVIATIONS_OUTPUT, outputs.ALIGNMENT_REPORT),
     (
         Figure("ELEMENT_COUNT", "Number of elements"),
         Figure("RMS", "Root mean square of the slews [mm]"),

@@ -2,8 +2,85 @@
 
 from __future__ import annotations
 
-from . import shared
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from ..errors import RasterError
+from ..frpdf.models import MODELS, Model, choose
+from . import outputs, shared
 from .declaration import RAIL_WORDS, STEPS, Job, RasterOutput
+
+if TYPE_CHECKING:
+    from ..files.raster_file import RasterHeader
+    from ..progress import Progress
+    from ..standards import RailStandard
+    from .result import Result
+    from .values import Values
+
+READING = 0.05
+"""Fraction of the progress bar for reading the raster."""
+
+CELL_TOLERANCE = 0.03
+"""Relative deviation allowed from the cell size that the network expects; its training covered such a deviation."""
+
+
+def _check(values: Values) -> None:
+    """Check that a model fits the raster."""
+    _planned(values)
+
+
+def _planned(values: Values) -> tuple[RasterHeader, Model]:
+    """Return the header of the result, and the model that makes it."""
+    header = values.raster("INPUT").header
+    standard = header.standard(values["GAUGE"], values["HEAD_WIDTH"])
+    model = model_for(header, standard, values["MODEL"])
+    gauge_m, head_width_m = standard.gauge_m, standard.head_width_m
+    return replace(header, gauge_m=gauge_m, head_width_m=head_width_m, model=model.name), model
+
+
+def model_for(header: RasterHeader, standard: RailStandard, name: str) -> Model:
+    """Return the model that the user named, or that a raster names, or that fits its rails; check the cell size.
+
+    Raises
+    ------
+    ModelError
+        No model fits.
+    RasterError
+        The cells do not have the size that the network expects for these rails.
+    """
+    from ..raster import cell_size
+
+    gauge_m, head_m = standard.gauge_m, standard.head_width_m
+    expected_m = cell_size(gauge_m, head_m)
+    if not math.isclose(header.cell_m, expected_m, rel_tol=CELL_TOLERANCE):
+        raise RasterError(
+            f"The raster's cells are {1000 * header.cell_m:.1f} mm wide, but a gauge of {1000 * gauge_m:.0f} mm with "
+            f"a railhead of {1000 * head_m:.1f} mm needs {1000 * expected_m:.1f} mm: rasterize the points for these "
+            "rails, or correct GAUGE and HEAD_WIDTH."
+        )
+    named = {model.name: model for model in MODELS}
+    return named.get(name) or named.get(header.model or "") or choose(gauge_m, head_m)
+
+
+def _run(values: Values, progress: Progress) -> Result:
+    """Clean each band."""
+    from ..frpdf.cleanup import clean
+    from ..frpdf.engines import make_engine
+    from ..frpdf.weights import load_arrays
+    from .result import Result
+
+    header, model = _planned(values)
+    engine = make_engine(load_arrays(model.path), values["ENGINE"], values["DEVICE"])
+    rasters = values.raster("INPUT").read(progress.span(0, READING))
+    progress.info(f"Network {model.name}, {engine.description}.")
+    shares = progress.span(READING, 1).split(len(rasters))
+    cleaned = [clean(raster, engine, values["ITERATIONS"], share) for raster, share in zip(rasters, shares)]
+    for code, before, after in zip(header.class_codes, rasters, cleaned):
+        progress.info(f"Class {code}: {before.count():,} rail cells before, {after.count():,} after.")
+    figures = {"ENGINE_USED": engine.description}
+    return Result(figures, header.frame, rasters={"OUTPUT": lambda: (header, cleaned)})
+
 
 JOB = Job(
     "frpdfcleanup",
@@ -16,7 +93,10 @@ JOB = Job(
     (("numpy",), ("pyproj",), ("cv2", "torch")),
     (shared.RASTER, shared.MODEL, *shared.CLEANUP, *shared.RASTER_RAIL),
     (RasterOutput("OUTPUT", "Cleaned rail raster", "A GeoTIFF; the input of Vectorize Rails."),),
-    (shared.ENGINE_USED,),
+    (outputs.ENGINE_USED,),
     STEPS,
     picture="raster.svg",
+    call="clean",
+    check=_check,
+    run=_run,
 )

@@ -9,7 +9,7 @@ from ..errors import ParameterError
 from ..parameters import GrowParameters
 from ..progress import Estimating
 from ..standards import SEARCHED_CLASSES
-from . import shared
+from . import outputs, shared
 from .classify_rail_points import classified
 from .declaration import (
     CLOUD_NEEDS,
@@ -113,10 +113,10 @@ def _check(values: Values) -> None:
 
 def _run(values: Values, progress: Progress) -> Result:
     """Follow the rails and write the copy."""
+    from ..files.layers import stops_layer
     from ..grow.settings import GrowSettings
     from ..labelling.files import Choice, plan_output
     from ..labelling.growing import grow_files
-    from ..output.layers import stops_layer
     from ..run.loop import Runner
 
     progress, standard = Estimating(progress), values.standard()
@@ -159,7 +159,7 @@ JOB = Job(
         *shared.CONTENT,
     ),
     (
-        *shared.CLASSIFIED,
+        *outputs.CLASSIFIED,
         LayerOutput(
             "STOPS",
             "Stops",
@@ -169,7 +169,7 @@ JOB = Job(
             kind=POINT,
         ),
     ),
-    shared.CLASSIFIED_FIGURES,
+    outputs.CLASSIFIED_FIGURES,
     RAW_CLOUDS,
     picture="gauge.svg",
     call="grow",

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ..errors import CrsError, ParameterError
-from . import shared
+from . import outputs, shared
 from .declaration import (
     ALIGNMENT,
     ALIGNMENT_WORDS,
@@ -43,8 +43,8 @@ def _check(values: Values) -> None:
 
 def _system(values: Values) -> str | None:
     """Return the coordinate system of the file as WKT: what it states, else CRS, else that of the tracks."""
-    from ..alignment.landxml_reading import stated_system
     from ..clouds.crs import codes_and_names, parse_crs, units
+    from ..files.landxml_reading import stated_system
 
     stated = stated_system(values["INPUT"]) or values["CRS"]
     if not stated and values.filled("TRACKS"):
@@ -61,10 +61,10 @@ def _system(values: Values) -> str | None:
 
 def _run(values: Values, progress: Progress) -> Result:
     """Read the file, and compare the tracks with it."""
-    from ..alignment.landxml_reading import read_landxml
     from ..fields import DEVIATIONS
-    from ..output.design_files import check_place
-    from ..output.layers import axes_layer, elements_layer, stations_layer
+    from ..files.design_files import check_place
+    from ..files.landxml_reading import read_landxml
+    from ..files.layers import axes_layer, elements_layer, stations_layer
     from ..progress import Recording
     from ..report import build_alignment_page
     from .result import Result
@@ -96,7 +96,6 @@ def _compared(
 ) -> list[tuple[Alignment, Deviations]]:
     """Return the deviations of each track with the alignment beside it; none without tracks."""
     from ..alignment.deviations import compared_with
-    from ..alignment.measured import moved
     from .reading import check_same_plane, read_tracks
 
     if not values.filled("TRACKS"):
@@ -104,7 +103,7 @@ def _compared(
     tracks, theirs = read_tracks(values, "TRACKS", progress)
     check_same_plane("TRACKS", theirs.crs_wkt, "INPUT", alignments[0].frame)
     shift = theirs.shift_to(alignments[0].frame)
-    return compared_with(alignments, [moved(one, shift) for one in tracks], progress)
+    return compared_with(alignments, [replace(one, xyz=one.xyz + shift) for one in tracks], progress)
 
 
 JOB = Job(
@@ -158,17 +157,17 @@ JOB = Job(
         shared.RAILS_OF_CANT,
     ),
     (
-        shared.ELEMENTS_OUTPUT,
+        outputs.ELEMENTS_OUTPUT,
         LayerOutput(
             "AXIS",
             "Axes",
             "A line for each alignment, less than a millimetre off the exact curve, with kilometres as M values.",
             optional=True,
         ),
-        replace(shared.DEVIATIONS_OUTPUT, on_demand=True),
-        shared.ALIGNMENT_REPORT,
+        replace(outputs.DEVIATIONS_OUTPUT, on_demand=True),
+        outputs.ALIGNMENT_REPORT,
     ),
-    shared.ALIGNMENT_FIGURES,
+    outputs.ALIGNMENT_FIGURES,
     ALIGNMENT,
     picture="alignment.svg",
     guide="alignment_files",

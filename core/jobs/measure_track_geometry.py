@@ -11,7 +11,7 @@ from ..fields import QUALITY_FIELDS
 from ..parameters import Parameters
 from ..progress import Recording
 from ..standards import CUSTOM, RailStandard, resolve
-from . import shared
+from . import outputs, shared
 from .declaration import CLOUD_NEEDS, RAIL_WORDS, TRACK_WORDS, Job, LayerInput
 
 if TYPE_CHECKING:
@@ -43,9 +43,10 @@ def _stated(values: Values) -> RailStandard | None:
 
 def _run(values: Values, progress: Progress) -> Result:
     """Measure each track."""
-    from ..output.layers import network_makers
+    from ..checks.listing import summary
+    from ..files.layers import network_makers
     from ..rails import RailNetwork
-    from ..report import Origin, summary
+    from ..report import Origin
     from ..squares.remeasuring import measure_rails
     from ..tracks.geometry import measure_track_geometry
     from ..tracks.parallels import widths_by_gauge
@@ -73,7 +74,7 @@ def _run(values: Values, progress: Progress) -> Result:
     origin = Origin(paths, standard or _own_standard(measured, head_width_m), other_gauges, values.command)
     made, codes = network_makers(network, origin.gauges_m), tuple(cloud.class_code for cloud in tracks.clouds)
     return Result(
-        shared.figures_of_stations(measured),
+        outputs.figures_of_stations(measured),
         frame,
         {"OUTPUT": made["quality"], "FINDINGS": made["findings"]},
         {"REPORT": lambda: origin.report(network)},
@@ -137,11 +138,11 @@ JOB = Job(
         *shared.axis(optional=True),
     ),
     (
-        replace(shared.QUALITY_OUTPUT, name="OUTPUT"),
-        replace(shared.FINDINGS_OUTPUT, on_demand=True),
-        shared.REPORT,
+        replace(outputs.QUALITY_OUTPUT, name="OUTPUT"),
+        replace(outputs.FINDINGS_OUTPUT, on_demand=True),
+        outputs.REPORT,
     ),
-    shared.QUALITY_FIGURES,
+    outputs.QUALITY_FIGURES,
     fields=QUALITY_FIELDS,
     picture="gauge.svg",
     pages=("parameters", "reference"),

@@ -2,8 +2,44 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
+from ..frpdf.models import choose
 from . import shared
 from .declaration import CLOUD_WORDS, RAIL_WORDS, STEPS, Job, RasterOutput
+
+if TYPE_CHECKING:
+    from ..progress import Progress
+    from .result import Result
+    from .values import Values
+
+
+def _check(values: Values) -> None:
+    """Check that a network fits the rails."""
+    standard = values.standard()
+    choose(standard.gauge_m, standard.head_width_m)
+
+
+def _run(values: Values, progress: Progress) -> Result:
+    """Rasterize each class."""
+    from ..checks.density import plausible
+    from ..files.raster_file import header_for
+    from ..raster import cell_size, rasterize
+    from ..tiles.grid import MemorySource
+    from .clouds import read_points
+    from .result import Result
+    from .track_inputs import SQUARE_M
+
+    standard = values.standard()
+    clouds = read_points(values.cloud(), values.class_codes(), values.extent, progress)
+    dense = {source.class_code for source in plausible([MemorySource(one, SQUARE_M) for one in clouds], progress)}
+    clouds = tuple(points for points in clouds if points.class_code in dense)
+    cell_m = cell_size(standard.gauge_m, standard.head_width_m)
+    rasters = [rasterize(points.xyz, cell_m) for points in clouds]
+    frame, codes = clouds[0].frame, [points.class_code for points in clouds]
+    header = header_for(rasters, codes, frame, standard, values.extent(frame.crs_wkt))
+    return Result({}, frame, rasters={"OUTPUT": lambda: (header, rasters)})
+
 
 JOB = Job(
     "rasterizerailpoints",
@@ -24,4 +60,7 @@ JOB = Job(
     ),
     group=STEPS,
     picture="raster.svg",
+    call="rasterize",
+    check=_check,
+    run=_run,
 )

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..alignment.cant_of_rails import cant_of_rails
 from ..alignment.elements import Alignment
-from ..alignment.measured import Track, stations_by_track, with_cant
-from ..alignment.table import alignments, check_table, frame_of, read_table
+from ..alignment.measured import Track, cant_of_rails, stations_by_track, with_cant
 from ..clouds.crs import name_of, parse_crs, same_plane, units
 from ..errors import CrsError
+from ..files.table import alignments, check_table, frame_of, read_table
 from ..frame import LocalFrame
 from ..progress import SILENT, Progress
 from .lines import system_of

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any
 
 from ..disk import Destination
 from ..errors import ParameterError
-from ..output.layers import Layer
+from ..files.layers import AnyLayer, written_by_name
 
 if TYPE_CHECKING:
     import geopandas
 
+    from ..files.raster_file import RasterHeader
     from ..frame import LocalFrame
-    from ..output.raster_file import RasterHeader
     from ..raster import RailRaster
 
     Rasters = tuple[RasterHeader, Sequence[RailRaster]]
@@ -52,7 +52,6 @@ class Result:
         Makes a web page, by the name of the output.
     sentences : tuple of str
         The result in words.
-    cloud : ShownCloud, optional
     rasters : mapping of str to callable
         Makes rasters of one grid and their header, None if they are empty, by the name of the output.
     found : object
@@ -61,7 +60,7 @@ class Result:
 
     figures: Mapping[str, Any]
     frame: LocalFrame
-    layers: Mapping[str, Callable[[], Layer]] = field(default_factory=dict)
+    layers: Mapping[str, Callable[[], AnyLayer]] = field(default_factory=dict)
     pages: Mapping[str, Callable[[], str]] = field(default_factory=dict)
     sentences: tuple[str, ...] = ()
     cloud: ShownCloud | None = None
@@ -83,9 +82,9 @@ class Result:
         """
         geopandas = package("geopandas")
         (written,) = self._made([layer])
-        from ..output.writing import shapes_of
+        from ..files.writing import shapes_of
 
-        columns = dict(zip((one.name for one in written.product.fields), written.written_columns()))
+        columns = written_by_name(written)
         return geopandas.GeoDataFrame(columns, geometry=shapes_of(written, self.frame), crs=self.frame.crs_wkt or None)
 
     def save(self, path: str | Path, layer: str | None = None) -> None:
@@ -110,7 +109,7 @@ class Result:
             raise ParameterError(f"{Path(path).name} can't be written: let the name end in {' or '.join(FORMATS)}.")
         names = list(self.layers) if layer is None and suffix == ".gpkg" else [layer or next(iter(self.layers))]
         made = self._made(names)
-        from ..output.writing import write_layers
+        from ..files.writing import write_layers
 
         write_layers(made, Destination.at(Path(path)), self.frame)
 
@@ -128,7 +127,7 @@ class Result:
             raise ParameterError("This result has no report: save its layers.")
         Destination.at(Path(path)).write_text(self.pages["REPORT"]())
 
-    def _made(self, names: Collection[str]) -> list[Layer]:
+    def _made(self, names: Collection[str]) -> list[AnyLayer]:
         """Make the layers of these names."""
         unknown = {name.upper() for name in names} - set(self.layers)
         if unknown:

@@ -2,9 +2,98 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
+from ..errors import CrsError, RailExtractError
 from ..fields import EXTENT_FIELDS, STATION_FIELDS
 from . import shared
 from .declaration import ALIGNMENT, LINE_NEEDS, PLACES, RAIL_WORDS, Figure, Job, LayerInput, LayerOutput
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from ..kilometres.axes import PlacedAxes
+    from ..progress import Progress
+    from .places import Places
+    from .result import Result
+    from .values import Values
+
+READING, LOCATING = 0.3, 0.7
+"""Fractions of the progress bar at which the features are read, and at which they have their kilometres."""
+
+
+def _check(values: Values) -> None:
+    """Check that the layer has places, and read the axis."""
+    if not values.source("INPUT").kinds:
+        raise RailExtractError("INPUT is a table without places: give a layer of points, lines or polygons.")
+    values.prepare(values.system("INPUT"))
+    values.axes(_plane(values))
+
+
+def _plane(values: Values) -> str | None:
+    """Return the coordinate system in which kilometres are measured: that of the axis, else that of the places.
+
+    Raises
+    ------
+    CrsError
+        Those that are known are in degrees.
+    """
+    from ..clouds.crs import is_geographic, parse_crs
+    from ..kilometres.axes import AXIS_IN_DEGREES
+
+    known = [crs_wkt for crs_wkt in map(values.system, ("AXIS", "INPUT")) if crs_wkt]
+    plane = next((crs_wkt for crs_wkt in known if not is_geographic(parse_crs(crs_wkt))), None)
+    if known and plane is None:
+        raise CrsError(AXIS_IN_DEGREES)
+    return plane
+
+
+def _run(values: Values, progress: Progress) -> Result:
+    """Give the features their kilometres."""
+    import numpy as np
+
+    from ..clouds.crs import unit_in_plan
+    from ..files.layers import Copy
+    from ..frame import LocalFrame
+    from ..rails import Kilometres
+    from .result import Result
+
+    plane = _plane(values)
+    axes = values.axes(plane)
+    places = values.places("INPUT", plane, progress.span(0, READING))
+    known = axes.on_map(places.xy, places.ids, progress)
+    found = Kilometres.empty(len(places.ids))
+    found.put(known, axes.locate(places.xy[known], progress.span(READING, LOCATING)))
+    columns = [getattr(found, one.name) for one in STATION_FIELDS]
+    if not places.are_points:
+        columns += _extents_km(places, known, axes, progress.span(LOCATING, 1.0))
+    fields = (*STATION_FIELDS, *EXTENT_FIELDS)[: len(columns)]
+    count = int(np.isfinite(found.km).sum())
+    figures = {
+        "PLACE_COUNT": count,
+        "BEYOND_COUNT": len(found.km) - count,
+        "AMBIGUOUS_COUNT": sum(map(bool, found.ambiguous)),
+    }
+    crs_wkt = values.system("INPUT")
+    return Result(
+        figures,
+        LocalFrame(np.zeros(3), unit_in_plan(crs_wkt), crs_wkt=crs_wkt),
+        {"OUTPUT": lambda: Copy(places.originals, fields, columns)},
+        sentences=(f"{count} of {len(found.km)} features have a kilometre.",),
+    )
+
+
+def _extents_km(places: Places, known: np.ndarray, axes: PlacedAxes, progress: Progress) -> list[np.ndarray]:
+    """Return the smallest and the largest kilometre of the vertices of features, (n,) each; NaN without any."""
+    import numpy as np
+
+    mine = known[places.owner]
+    km = axes.kilometres(places.vertices[mine], progress).km
+    first, last = np.full((2, len(known)), np.nan)
+    np.fmin.at(first, places.owner[mine], km)
+    np.fmax.at(last, places.owner[mine], km)
+    return [first, last]
+
 
 JOB = Job(
     "stationalongaxis",
@@ -44,4 +133,7 @@ JOB = Job(
     "stationing.svg",
     "stationing",
     ("stationing", "reference"),
+    call="station",
+    check=_check,
+    run=_run,
 )

@@ -12,8 +12,8 @@ from ..errors import RailExtractError
 from ..frame import LocalFrame
 from ..progress import Progress
 from ..rails import Centerline, RailLine, TrackGeometry
-from ..squares.spool import SpooledPoints
 from ..standards import RAIL_CLASS
+from ..tiles.spool import SpooledPoints
 from .area_points import Area, spool_points_in
 from .clouds import Bounds
 from .reading import way
@@ -35,8 +35,6 @@ class TrackInputs:
 
     Attributes
     ----------
-    centerlines : tuple of Centerline
-    rails : tuple of RailLine
     clouds : tuple of SpooledPoints
         One for each class of the rails; empty without a cloud.
     frame : LocalFrame
@@ -78,10 +76,8 @@ def check_gauges(tracks: TrackInputs, measured: Sequence[TrackGeometry], progres
 
     Parameters
     ----------
-    tracks : TrackInputs
     measured : sequence of TrackGeometry
         One for each centerline.
-    progress : Progress
 
     Raises
     ------

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 from ..parameters import DEFAULT_EPOCHS
 from ..progress import Estimating, Until
 from ..standards import SEARCHED_CLASSES
-from . import shared
+from . import outputs, shared
 from .declaration import CLOUD_NEEDS, CLOUD_WORDS, RAIL_WORDS, RAW_CLOUDS, Figure, FileInput, FileOutput, Job, Number
 
 if TYPE_CHECKING:
-    from ..labelling.training import Plan
+    from ..learned.examples import Plan
     from ..progress import Progress
     from .result import Result
     from .values import Values
@@ -23,7 +23,7 @@ MAX_EPOCHS, MAX_SEED = 10_000, 2**31 - 1
 
 def _plan(values: Values) -> Plan:
     """Return what the training is given, besides the cloud."""
-    from ..labelling.training import Plan
+    from ..learned.examples import Plan
 
     return Plan(values.class_codes(), values["EPOCHS"], values["SEED"], values["DEVICE"], values["START"])
 
@@ -137,7 +137,7 @@ JOB = Job(
             "Card",
             "A web page with recall and precision by tile, the course of the training, and its settings.",
             optional=True,
-            kinds=shared.WEB_PAGES,
+            kinds=outputs.WEB_PAGES,
         ),
     ),
     (

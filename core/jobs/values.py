@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -30,11 +31,14 @@ if TYPE_CHECKING:
     import numpy as np
 
     from ..airborne.survey import Guide
-    from ..alignment.placed_axes import PlacedAxes
     from ..clouds.points import Request
+    from ..files.rail_rasters import RasterSource
+    from ..kilometres.axes import PlacedAxes
     from ..progress import Progress
     from ..run.loop import Runner
+    from .features import Source
     from .lines import Lines
+    from .places import Places
 
 NUMBERS = {
     "SMOOTHING_XY": "smoothing_xy_m",
@@ -77,6 +81,8 @@ class Values(ABC):
     """Values of the parameters of one run of a job."""
 
     job: Job
+    _read: dict[str, Any]
+    """What was read, of which QGIS reads some in the main thread."""
 
     @property
     @abstractmethod
@@ -116,24 +122,20 @@ class Values(ABC):
         """Provide the runner with as many processes as WORKERS asks for."""
 
     @abstractmethod
-    def system(self, name: str) -> str | None:
-        """Return the coordinate system of a layer as WKT; None if it has none."""
+    def source(self, name: str) -> Source:
+        """Return a vector layer or a table."""
 
     @abstractmethod
-    def rows(self, name: str, progress: Progress) -> Rows:
-        """Read the fields of a layer."""
-
-    @abstractmethod
-    def lines(self, name: str, progress: Progress) -> Lines:
-        """Read the lines of a layer."""
-
-    @abstractmethod
-    def axes(self, crs_wkt: str | None) -> PlacedAxes:
-        """Read AXIS and what states its kilometres, in a coordinate system."""
+    def picked(self, crs_wkt: str | None) -> Sequence[np.ndarray]:
+        """Return the places of SEED in a coordinate system, (1, 2) each."""
 
     @abstractmethod
     def cloud(self, name: str = "INPUT") -> CloudSource:
         """Return the files of a cloud, and which of their points count."""
+
+    @abstractmethod
+    def raster(self, name: str) -> RasterSource:
+        """Return a file of rail rasters."""
 
     @abstractmethod
     def extent(self, crs_wkt: str | None) -> Bounds | None:
@@ -143,17 +145,69 @@ class Values(ABC):
     def scratch(self) -> AbstractContextManager[Path]:
         """Provide a folder for the points of a run."""
 
-    @abstractmethod
+    def once(self, key: str, read: Callable[[], Any]) -> Any:
+        """Return what was read before under a key, else read it."""
+        if key not in self._read:
+            self._read[key] = read()
+        return self._read[key]
+
+    def system(self, name: str) -> str | None:
+        """Return the coordinate system of a layer as WKT; None if it has none."""
+        return self.source(name).crs_wkt
+
+    def rows(self, name: str, progress: Progress) -> Rows:
+        """Read the fields of a layer; see `read_rows`."""
+        from .features import read_rows
+
+        return read_rows(self.source(name), progress)
+
+    def lines(self, name: str, progress: Progress) -> Lines:
+        """Read the lines of a layer; see `read_lines`."""
+        from .features import read_lines
+
+        return read_lines(self.source(name), progress)
+
+    def axes(self, crs_wkt: str | None) -> PlacedAxes:
+        """Read AXIS and what states its kilometres; see `read_axes`."""
+        from .features import read_axes
+
+        return self.once("axes", lambda: read_axes(self, crs_wkt))
+
+    def places(self, name: str, plane: str | None, progress: Progress) -> Places:
+        """Read the features of a layer of any kind, in the plane of the axes; see `places_of`."""
+        from .places import places_of
+
+        return places_of(self.source(name), plane, progress)
+
     def lines_along(self, name: str, crs_wkt: str | None) -> Sequence[np.ndarray]:
-        """Read lines that show places along tracks, (k, 2) each, in a coordinate system."""
+        """Read lines that show places along tracks; see `read_lines_along`."""
+        from .features import read_lines_along
 
-    @abstractmethod
+        return self.once("lines along", lambda: read_lines_along(self.source(name), crs_wkt))
+
     def guides(self, name: str, crs_wkt: str | None) -> Sequence[Guide]:
-        """Read such lines with what they state of their tracks."""
+        """Read such lines with what they state of their tracks; see `read_guides`."""
+        from .features import read_guides
 
-    @abstractmethod
+        return self.once("guides", lambda: read_guides(self.source(name), crs_wkt))
+
     def seeds(self, crs_wkt: str | None) -> Sequence[np.ndarray]:
         """Read SEEDS and SEED in a coordinate system: points, (1, 2), and lines, (k, 2)."""
+        return self.once("seeds", lambda: self._seeds(crs_wkt))
+
+    def _seeds(self, crs_wkt: str | None) -> list[np.ndarray]:
+        from .features import read_seeds
+
+        layer = read_seeds(self.source("SEEDS"), crs_wkt) if self.filled("SEEDS") else []
+        return [*layer, *(self.picked(crs_wkt) if self.has("SEED") and self.filled("SEED") else [])]
+
+    def with_mask(self, cloud: CloudSource) -> CloudSource:
+        """Return a cloud limited to MASK and without what LEAVE_OUT names, where the job has these."""
+        from .features import read_mask
+
+        has_mask = self.has("MASK") and self.filled("MASK")
+        mask = read_mask(self.source("MASK"), checked_crs(cloud)) if has_mask else None
+        return replace(cloud, mask=mask, leave_out=(self["LEAVE_OUT"] or ()) if self.has("LEAVE_OUT") else ())
 
     @property
     def keeps(self) -> bool:

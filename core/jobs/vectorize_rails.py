@@ -3,9 +3,73 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
-from . import shared
+from ..fields import RAILS
+from . import outputs, shared
 from .declaration import CLOUD_NEEDS, CLOUD_WORDS, RAIL_WORDS, STEPS, Job
+
+if TYPE_CHECKING:
+    from ..frame import LocalFrame
+    from ..progress import Progress
+    from ..rails import RailLine
+    from ..raster import RailRaster
+    from ..standards import RailStandard
+    from .result import Result
+    from .values import Values
+
+READING = 0.3
+"""Fraction of the progress bar for reading raster and cloud."""
+
+
+def _standard(values: Values) -> RailStandard:
+    """Return the rails of the raster, whose header is checked."""
+    return values.raster("INPUT").header.standard(values["GAUGE"], values["HEAD_WIDTH"])
+
+
+def _check(values: Values) -> None:
+    """Check the header of the raster."""
+    _standard(values)
+
+
+def _run(values: Values, progress: Progress) -> Result:
+    """Vectorize each class."""
+    from ..checks.lines import warn_of_rails
+    from ..files.layers import lines_layer
+    from ..squares.steps import lines_of
+    from .area_points import Area, read_points_in
+    from .result import Result
+
+    source, header = values.raster("INPUT"), values.raster("INPUT").header
+    rasters, frame, clouds = source.read(progress.span(0, READING / 2)), header.frame, {}
+    if values.filled("POINTS"):
+        area = Area("raster", header.class_codes, header.bounds, header.frame)
+        clouds = read_points_in(area, values.cloud("POINTS"), progress.span(READING / 2, READING))
+        frame = clouds[header.class_codes[0]].frame
+        rasters = tuple(moved(raster, header.frame, frame) for raster in rasters)
+    else:
+        progress.warning("Without POINTS, the rails have no heights and are only as accurate as the raster.")
+    settings = values.settings(_standard(values))
+    rails: list[RailLine] = []
+    shares = progress.span(READING, 1).split(len(rasters))
+    for raster, code, share in zip(rasters, header.class_codes, shares):
+        found = lines_of(raster, code, clouds.get(code), settings, share, first_id=len(rails) + 1)
+        warn_of_rails(found, code, settings, progress)
+        rails += found
+    return Result(outputs.figures_of(rails, "RAIL"), frame, {"OUTPUT": lambda: lines_layer(RAILS, rails)})
+
+
+def moved(raster: RailRaster, frame: LocalFrame, other: LocalFrame) -> RailRaster:
+    """Return a raster in another local frame of the same coordinate system.
+
+    Parameters
+    ----------
+    frame, other : LocalFrame
+        Present frame and new frame.
+    """
+    right, up, _ = frame.shift_to(other)
+    return replace(raster, x0=raster.x0 + float(right), y0=raster.y0 + float(up))
+
 
 JOB = Job(
     "vectorizerails",
@@ -30,8 +94,11 @@ JOB = Job(
         *shared.RASTER_RAIL,
         shared.LEFT_OUT,
     ),
-    (replace(shared.RAILS_OUTPUT, name="OUTPUT", optional=False),),
-    shared.RAIL_FIGURES,
+    (replace(outputs.RAILS_OUTPUT, name="OUTPUT", optional=False),),
+    outputs.RAIL_FIGURES,
     STEPS,
     picture="gauge.svg",
+    call="vectorize",
+    check=_check,
+    run=_run,
 )

@@ -89,7 +89,6 @@ class Result:
         See `Output`.
     point_count : int
         Points in the files that were read.
-    figures : SearchFigures
     stops : tuple of Stop
         Where rails that grew from seeds were not followed further, in metres from the zero of the request; each place
         once.
@@ -164,24 +163,17 @@ def classify_files(
     ----------
     request : Request
         Files, `standards.SEARCHED_CLASSES` classes and extent.
-    settings : Settings
-    choice : Choice
     output : Output
         From `plan_output`, for the files of the request.
     folder : Path
         Existing folder for temporary files, 42 bytes per point; the caller removes it.
     runner : Runner
         Its results are complete, or there is no output.
-    progress : Progress
 
     Raises
     ------
-    CloudError
-        A file is damaged, or its points are too far apart.
-    NoRailPointsError
-        The extent contains no points.
-    DiskError
-        The disk is full, or another program has changed an output.
+    CloudError, NoRailPointsError, DiskError
+        See `finding.find_rail_points`; `DiskError` also if another program has changed an output.
     RailExtractError
         A square could not be searched.
     """
@@ -215,24 +207,13 @@ def write_labelled(
 
 
 def _check_complete(runner: Runner) -> None:
-    """Refuse to continue without the results of tasks that failed.
-
-    Raises
-    ------
-    RailExtractError
-    """
+    """Refuse to continue without the results of tasks that failed."""
     if runner.failures:
         raise RailExtractError(f"{runner.failures[-1]} Nothing was written.")
 
 
 class Labels:
-    """Numbers of the rail points of each file, on disk.
-
-    Parameters
-    ----------
-    request : Request
-    folder : Path
-    """
+    """Numbers of the rail points of each file, on disk."""
 
     def __init__(self, request: Request, folder: Path) -> None:
         counts = [header.point_count for header in request.headers]
@@ -261,14 +242,7 @@ class Labels:
 
 
 class _Writer:
-    """Writes the files of a cloud with their new classes.
-
-    Parameters
-    ----------
-    request : Request
-    choice : Choice
-    labels : Labels
-    """
+    """Writes the files of a cloud with their new classes."""
 
     def __init__(self, request: Request, choice: Choice, labels: Labels) -> None:
         self._request, self._choice, self._labels = request, choice, labels
@@ -338,13 +312,7 @@ def _without_copc(file: Path, progress: Progress) -> Path:
 
 
 def _tile_names(files: Sequence[Path], progress: Progress) -> tuple[str, ...]:
-    """Return the name of each new tile.
-
-    Raises
-    ------
-    ParameterError
-        Two tiles have the same name.
-    """
+    """Return the name of each new tile; no two may have the same."""
     names = tuple(_without_copc(file, progress).name for file in files)
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice:
@@ -353,24 +321,13 @@ def _tile_names(files: Sequence[Path], progress: Progress) -> tuple[str, ...]:
 
 
 def _check_folder(folder: Path, names: Sequence[str]) -> None:
-    """Refuse to replace a folder that holds anything else than tiles of these names.
-
-    Raises
-    ------
-    DiskError
-    """
+    """Refuse to replace a folder that holds anything else than tiles of these names."""
     if folder.exists() and (not folder.is_dir() or {one.name for one in folder.iterdir()} - set(names)):
         raise DiskError(f"{folder} exists and holds other files: choose another name.")
 
 
 def _move_tiles(output: Output, scratch: Path) -> None:
-    """Move a new folder of tiles from a temporary folder to its name; the old one stays if that fails.
-
-    Raises
-    ------
-    DiskError
-        Another run has written the folder in the meantime, or it holds other files.
-    """
+    """Move a new folder of tiles to its name; the old one stays if that fails, or if it was changed."""
     folder = output.folder
     with alone_in(folder.parent):
         if identity(folder) not in (None, output.before):

@@ -25,9 +25,9 @@ from ..progress import SILENT, Progress, counted
 from ..rails import ENOUGH_CELLS_PER_M, SearchFigures
 from ..run.loop import Runner
 from ..run.tasks import Context, Task
-from ..squares.grid import Key, Square, Tiling
-from ..squares.store import SortedFile, append, counts_of, files_of, read_stored
 from ..standards import LAST_CLASS
+from ..tiles.grid import Key, Square, Tiling
+from ..tiles.store import SortedFile, append, counts_of, files_of, read_stored
 
 POINT = np.dtype([("xyz", "<f8", 3), ("number", "<i8"), ("mark", "<u4")])
 """A point on disk: coordinates in units of the CRS, its number among all points of all files, and its mark, see
@@ -56,7 +56,6 @@ class Found:
         Their numbers among all points of all files.
     marks : (k,) uint32 array
         What tells their passes apart, see `passes.marks_of`.
-    figures : SearchFigures
     """
 
     xyz: np.ndarray
@@ -74,13 +73,11 @@ def find_rail_points(
     ----------
     request : Request
         Files, searched classes and extent.
-    settings : Settings
     folder : Path
         Empty folder for the points of the squares, 36 bytes each and a third more for those near borders; the caller
         removes it.
     runner : Runner
         Executes one task per file and one per square. Whether errors of single ones end the run is for it to decide.
-    progress : Progress
 
     Yields
     ------
@@ -130,13 +127,7 @@ def _nothing_to_search(request: Request, guide: Guide | None) -> NoRailPointsErr
 
 
 def guide_of(request: Request, lines: Sequence[np.ndarray], distance_m: float, only: bool) -> Guide:
-    """Return the guide along lines, (k, 2) or (k, 3) in units of the CRS, as `Settings` take it.
-
-    Raises
-    ------
-    ParameterError
-        No line comes near the cloud.
-    """
+    """Return the guide along lines, (k, 2) or (k, 3) in units of the CRS; one that comes nowhere near is refused."""
     low, high = box_of(request, [header.extent for header in request.headers])
     flat = [request.zero.to_local(np.column_stack([line[:, :2], np.zeros(len(line))]))[:, :2] for line in lines]
     guide = Guide.through(flat, distance_m, only, (*low, *high))

@@ -17,17 +17,16 @@ from ..classify.guide import Guide
 from ..clouds.points import Request
 from ..disk import writing
 from ..errors import OffCloudError, OffRailError
-from ..grow.growth import Growth, Stop
+from ..grow.growth import APART, Growth, Growths, Stop, apart_first
 from ..grow.heads import OnHeads
-from ..grow.seeds import Growths
 from ..grow.settings import GrowSettings
 from ..polyline import Polyline
 from ..progress import SILENT, Progress
 from ..rails import SearchFigures
 from ..raster import BORDER_CELLS, cell_size
 from ..run.loop import Runner
-from ..squares.grid import Key
-from ..squares.store import files_of, read_stored
+from ..tiles.grid import Key
+from ..tiles.store import files_of, read_stored
 from .files import Choice, Labels, Output, Result, write_labelled
 from .finding import POINT, box_of, sort_files
 
@@ -59,26 +58,17 @@ def grow_files(
         Files, `standards.SEARCHED_CLASSES` classes and extent.
     seeds : sequence of (k, 2) array
         Places on railheads, k = 1, or lines along them, in units of the CRS.
-    settings : GrowSettings
-    choice : Choice
     output : Output
         From `files.plan_output`, for the files of the request.
     folder : Path
         Existing folder for temporary files, 36 bytes per point within reach; the caller removes it.
-    runner : Runner
-        Writes the files.
-    progress : Progress
 
     Raises
     ------
-    CloudError
-        A file is damaged.
-    DiskError
-        The disk is full, or another program has changed an output.
-    ParameterError
-        No seed is in the cloud.
-    RailExtractError
-        No seed is on a rail.
+    CloudError, DiskError
+        See `files.classify_files`.
+    OffCloudError, OffRailError
+        No seed is in the cloud, or on a rail.
     """
     growing, rewriting = progress.divide((7.0, 3.0))
     labels = Labels(request, folder)
@@ -124,15 +114,14 @@ def grow_all(
     Parameters and errors are those of `grow_files`.
     """
     reading, growing = progress.divide((1.0, 1.0))
-    local = [request.zero.to_local(np.column_stack([seed[:, :2], np.zeros(len(seed))]))[:, :2] for seed in seeds]
-    places = [Polyline(seed).resampled(LINE_STEP_M).xyz if len(seed) > 1 else seed for seed in local]
-    places = _in_cloud(request, places)
+    owner, places = _in_cloud(request, seeds)
     request.announce(progress)
-    cloud = Cloud(request, np.concatenate(places), settings, folder, reading)
+    cloud = Cloud(request, places, settings, folder, reading)
     progress.status("Following the rails")
-    growths = Growths(cloud.heads, settings)
-    # From both ends of a line, and from those of its places that no rail has reached.
-    is_on = [growths.add((*seed[:1], *seed[:0:-1]), share) for seed, share in zip(places, growing.split(len(places)))]
+    growths, is_on = Growths(cloud.heads, settings), np.zeros(len(seeds), dtype=bool)
+    order = apart_first(places, APART * settings.parameters.max_length_m).tolist()
+    for at, share in zip(order, growing.split(len(order))):
+        is_on[owner[at]] |= growths.add(places[at], share)
     growths.reach_on(progress)
     parameters = settings.parameters
     if not growths.grown:
@@ -140,9 +129,9 @@ def grow_all(
             f"No seed is on a rail: put seeds within {parameters.search_m:g} m of railheads that stand "
             f"{parameters.min_height_m:g} m above the bed, and check the rail standard and the unit of the coordinates."
         )
-    missed = is_on.count(False)
+    missed = int(np.count_nonzero(~is_on))
     if missed:
-        progress.warning(f"{missed} of {len(places)} seeds are not on a rail: move them onto railheads.")
+        progress.warning(f"{missed} of {len(seeds)} seeds are not on a rail: move them onto railheads.")
     return cloud, growths
 
 
@@ -151,12 +140,8 @@ class Cloud:
 
     Parameters
     ----------
-    request : Request
     places : (k, 2) array
         Seeds, metres from the zero of the coordinate system.
-    settings : GrowSettings
-    folder : Path
-    progress : Progress
     """
 
     def __init__(
@@ -176,19 +161,20 @@ class Cloud:
         return read_stored(files_of(key, self._sorted), POINT)
 
 
-def _in_cloud(request: Request, seeds: Sequence[np.ndarray]) -> list[np.ndarray]:
-    """Return the places of each seed, (k, 2), that may be in the cloud.
-
-    Raises
-    ------
-    OffCloudError
-        None is.
-    """
-    boxes = [box_of(request, [header.extent]) for header in request.headers]
-    found = [seed[_inside(seed, boxes)] for seed in seeds]
-    if not any(map(len, found)):
+def _in_cloud(request: Request, seeds: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Return the seed, (k,) int, and the place, (k, 2) metres, of all places of seeds that may be in the cloud."""
+    parts = [_places(request.zero.to_local(np.column_stack([seed[:, :2], np.zeros(len(seed))]))) for seed in seeds]
+    owner, places = np.repeat(np.arange(len(seeds)), [len(part) for part in parts]), np.concatenate(parts)
+    inside = _inside(places, [box_of(request, [header.extent]) for header in request.headers])
+    if not inside.any():
         raise OffCloudError("No seed is in the cloud: check the place and the coordinate system of the seeds.")
-    return found
+    return owner[inside], places[inside]
+
+
+def _places(seed: np.ndarray) -> np.ndarray:
+    """Return the places at which a seed, (k, 3) metres, looks for rails, (n, 2): of a line, its ends first."""
+    xy = Polyline(seed).resampled(LINE_STEP_M).xy if len(seed) > 1 else seed[:, :2]
+    return np.concatenate([xy[:1], xy[:0:-1]])
 
 
 def _inside(xy: np.ndarray, boxes: Sequence[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:

@@ -1,23 +1,31 @@
-"""From a labelled cloud to the weights of a classifier, in a folder that lets an interrupted training continue."""
+"""From a labelled cloud of any size to the weights of a classifier.
+
+The cloud is cut into blocks in a folder that lets an interrupted training continue.
+"""
 
 from __future__ import annotations
 
 import json
 import shutil
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from ..classify.settings import Settings
 from ..clouds.points import Request
 from ..disk import Destination, writing
-from ..errors import ParameterError
+from ..errors import NoRailPointsError, ParameterError
 from ..kernels import device_of
-from ..learned.examples import CHECKS, Examples
+from ..learned.examples import CHECKS, Examples, Plan, save_index, write_square
 from ..learned.model import WEIGHTS_SUFFIX, check_torch, load, save
 from ..progress import SILENT, Progress
-from .examples import write_examples
+from ..run.loop import Runner
+from ..scratch import scratch_folder
+from ..tiles.grid import Square
+from ..tiles.store import files_of, read_stored
+from .finding import POINT, sort_files
 
 if TYPE_CHECKING:
     from ..learned.training import Trained
@@ -29,29 +37,6 @@ SOURCE, EXAMPLES = "source.json", "examples"
 
 READING = 0.1
 """Share of a training that reading takes, for the progress."""
-
-
-@dataclass(frozen=True)
-class Plan:
-    """What a training is given, besides the cloud.
-
-    Attributes
-    ----------
-    rail_classes : tuple of int
-        Classes of the rail points.
-    epochs : int
-        How many times each block with rails is learned from.
-    seed : int
-    device : {"AUTO", "CPU", "CUDA"}
-    start : Path, optional
-        Weights to start from.
-    """
-
-    rail_classes: tuple[int, ...]
-    epochs: int
-    seed: int
-    device: str
-    start: Path | None = None
 
 
 def check_training(weights: Path, plan: Plan) -> None:
@@ -86,18 +71,15 @@ def train_classifier(
     ----------
     request : Request
         Files, `standards.SEARCHED_CLASSES` classes and extent.
-    settings : Settings
-    plan : Plan
     weights : Destination
         The .npz file. The folder `folder_of` it is removed once the weights are written.
-    progress : Progress
 
     Raises
     ------
     NoRailPointsError, ParameterError
         Nothing can be learned from the labels, or the folder holds another training.
     CloudError, DiskError, ModelError, Cancelled
-        See `examples.write_examples` and `learned.training.train`.
+        See `finding.find_rail_points` and `learned.training.train`.
     """
     from ..learned.training import Settings as TrainingSettings
     from ..learned.training import train
@@ -136,7 +118,7 @@ def _examples(request: Request, settings: Settings, plan: Plan, folder: Path, pr
         source.write_bytes(identity.encode())
         progress.status("Cutting the cloud into blocks")
         progress.reading()
-        found = write_examples(request, plan.rail_classes, settings, examples, progress)
+        found = _write_examples(request, plan.rail_classes, settings, examples, progress)
         found.validation(plan.seed)
         return found
     except BaseException:
@@ -159,3 +141,46 @@ def _identity(request: Request, settings: Settings, rail_classes: Sequence[int])
     mask = None if request.mask is None else list(map(str, request.mask.extent))
     extent = None if request.extent is None else list(map(str, request.extent))
     return json.dumps([files, list(rail_classes), settings.side_m, extent, mask, list(request.leave_out)])
+
+
+def _write_examples(
+    request: Request, rail_classes: Sequence[int], settings: Settings, folder: Path, progress: Progress = SILENT
+) -> Examples:
+    """Cut a labelled cloud into blocks in an existing folder; memory holds one square."""
+    starts = np.cumsum([header.point_count for header in request.headers])
+    reading, cutting = progress.divide((1.0, 1.0))
+    census = np.zeros(2, dtype=np.int64)
+    with writing(folder), scratch_folder(folder) as squares:
+        sorted_files = sort_files(request, settings, squares, Runner(), reading, with_class=True)
+        keys = sorted({key for one in sorted_files for key in one.counts})
+        entries = []
+        for file, key in enumerate(cutting.follow(keys)):
+            points = read_stored(files_of(key, sorted_files), POINT)
+            rail = np.isin(points["mark"], rail_classes)
+            tile = np.searchsorted(starts, points["number"], side="right")
+            census += np.bincount(rail, minlength=2)
+            xyz = Square.on_grid(key, settings.side_m, request.zero).frame.to_local(points["xyz"])
+            entries.append(write_square(folder, file, key, settings.side_m, xyz, rail, tile))
+        index = np.concatenate(entries) if entries else np.empty(0)
+        _check(census, index, rail_classes)
+        save_index(folder, index)
+    return Examples.load(folder)
+
+
+def _check(census: np.ndarray, index: np.ndarray, rail_classes: Sequence[int]) -> None:
+    """Refuse labels from which nothing can be learned."""
+    named = ", ".join(map(str, rail_classes))
+    others, rails = census
+    if not rails:
+        raise NoRailPointsError(
+            f"The cloud has no points of class {named} to learn from: classify its rails, or set the rail classes."
+        )
+    if not others:
+        raise ParameterError(
+            f"All points of the cloud are of class {named}: give the whole cloud, with the points around the rails."
+        )
+    if not index["rail"].any():
+        raise NoRailPointsError(
+            f"No point of class {named} is 0.055 to 0.4 m above the bed, where railheads are: check the labels and the "
+            "unit of the coordinates."
+        )

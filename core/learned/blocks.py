@@ -1,19 +1,22 @@
-"""What the network is given: the points of a square thinned by height zone and cut into blocks.
+"""What the network is given: the points of a square thinned by height zone and cut into blocks, and their neighbours.
 
 Gribov and Chang, section 3: a zone of heights in which rails lie, thinned ground, blocks of 4 x 4 m with at most 3000
-points each.
+points each. The points of a block are in random order, so each layer of the network keeps the first quarter of those of
+the layer before.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from ..classify.bed import Bed, Coarse
 from ..classify.tops import HIGH_M, LOW_M, TOP_M
-from ..squares.grid import Tiling
+from ..tiles.grid import Tiling
 
 BLOCK_M = 4.0
 """Side of a block: it holds both rails of a track of any gauge."""
@@ -33,6 +36,16 @@ from the air are then almost equally dense; the ground and what stands higher ar
 
 SHUFFLE_SEED = 20_20
 """Of the order in which points are dropped from layer to layer: random, but the same for the same points."""
+
+
+NEIGHBOURS = 16
+"""Nearest points that each point looks at, itself included; Hu et al. use as many."""
+
+RATIO = 4
+"""Points of a layer for each one of the next layer."""
+
+LAYERS = 4
+"""Levels of the pyramid, each coarser than the one below it."""
 
 
 @dataclass(frozen=True)
@@ -104,16 +117,9 @@ def thin(xyz: np.ndarray) -> Thinned:
 
 
 def _one_of_each(place: np.ndarray, side_m: float) -> tuple[np.ndarray, np.ndarray]:
-    """Choose the point nearest to the middle of each cube.
+    """Choose the point nearest to the middle of each cube; returns them, (k,) int, and the cube of each point, (n,).
 
     Points at the same distance are ordered by their places, so the choice does not depend on the order of the points.
-
-    Returns
-    -------
-    (k,) int array
-        The points chosen, in the order of the cubes.
-    (n,) int array
-        Number of the cube of each point.
     """
     scaled = place[:, :3].astype(float) / side_m
     cube = np.floor(scaled)
@@ -166,3 +172,54 @@ def centred(place: np.ndarray) -> np.ndarray:
     """Move the places of a block's points, (n, 4), to their middle in plan and their mean height, (n, 4) float32."""
     middle = np.append((place[:, :2].max(axis=0) + place[:, :2].min(axis=0)) / 2, place[:, 2].mean(dtype=float))
     return np.column_stack([place[:, :3] - middle, place[:, 3]]).astype(np.float32)
+
+
+@dataclass(frozen=True)
+class Layer:
+    """The points of a layer, those of all blocks behind each other.
+
+    Attributes
+    ----------
+    position : (n, 3) float32 array
+        Metres from the middle of the block.
+    near : (n, NEIGHBOURS) int64 array
+        Numbers of the nearest points of the same block. A block with fewer repeats them.
+    kept : (m,) int64 array
+        Numbers of the points that the next layer has.
+    nearest : (n,) int64 array
+        For each point, the nearest one of the next layer: its number there.
+    """
+
+    position: np.ndarray
+    near: np.ndarray
+    kept: np.ndarray
+    nearest: np.ndarray
+
+
+def build(blocks: Sequence[np.ndarray]) -> list[Layer]:
+    """Find the neighbours of the points of blocks, (n, 3) each, on all layers."""
+    layers = []
+    for _ in range(LAYERS):
+        parts = [_layer(position) for position in blocks]
+        starts = np.cumsum([0, *(len(part.position) for part in parts)])
+        next_starts = np.cumsum([0, *(len(part.kept) for part in parts)])
+        layers.append(
+            Layer(
+                np.concatenate([part.position for part in parts]),
+                np.concatenate([part.near + start for part, start in zip(parts, starts)]),
+                np.concatenate([part.kept + start for part, start in zip(parts, starts)]),
+                np.concatenate([part.nearest + start for part, start in zip(parts, next_starts)]),
+            )
+        )
+        blocks = [part.position[part.kept] for part in parts]
+    return layers
+
+
+def _layer(position: np.ndarray) -> Layer:
+    """Find the neighbours within one block."""
+    count = len(position)
+    near = cKDTree(position).query(position, k=np.arange(1, min(NEIGHBOURS, count) + 1))[1]
+    near = np.resize(near.T, (NEIGHBOURS, count)).T if count < NEIGHBOURS else near
+    kept = np.arange(-(-count // RATIO))
+    nearest = cKDTree(position[kept]).query(position)[1]
+    return Layer(position, near.astype(np.int64), kept, nearest.astype(np.int64))

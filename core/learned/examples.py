@@ -36,6 +36,29 @@ CHECKS = "checks.json"
 
 
 @dataclass(frozen=True)
+class Plan:
+    """What a training is given, besides the cloud.
+
+    Attributes
+    ----------
+    rail_classes : tuple of int
+        Classes of the rail points.
+    epochs : int
+        How many times each block with rails is learned from.
+    seed : int
+    device : {"AUTO", "CPU", "CUDA"}
+    start : Path, optional
+        Weights to start from.
+    """
+
+    rail_classes: tuple[int, ...]
+    epochs: int
+    seed: int
+    device: str
+    start: Path | None = None
+
+
+@dataclass(frozen=True)
 class Examples:
     """Labelled blocks.
 

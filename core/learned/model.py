@@ -14,8 +14,7 @@ from ..frpdf.weights import load_arrays, save_arrays
 from ..kernels import device_of, one_thread, pytorch
 from ..parameters import LEARNED
 from ..progress import SILENT, Progress
-from .blocks import MAX_POINTS, Block, Thinned, centred
-from .pyramid import build
+from .blocks import MAX_POINTS, Block, Thinned, build, centred
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -34,17 +33,7 @@ NO_TORCH = "{} needs PyTorch: install it with the algorithm Install packages, or
 
 
 def check_torch(what: str) -> None:
-    """Check that PyTorch starts.
-
-    Parameters
-    ----------
-    what : str
-        What needs it, for the message.
-
-    Raises
-    ------
-    ModelError
-    """
+    """Check that PyTorch starts; `ModelError` says what needs it."""
     try:
         import torch  # noqa: F401
     except (ImportError, OSError) as error:  # Windows: a missing library
@@ -143,14 +132,7 @@ class Classifier:
 
 
 def weights_for(method: str, weights: Path | None) -> Path | None:
-    """Return the weights that a method uses, after a check that they can be; None for geometry.
-
-    Parameters
-    ----------
-    method : str
-        One of `parameters.METHODS`.
-    weights : Path, optional
-        None means `SHIPPED` if the method is LEARNED.
+    """Return the weights that one of `parameters.METHODS` uses, after a check that they can be; None for geometry.
 
     Raises
     ------

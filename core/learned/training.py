@@ -149,7 +149,6 @@ class Trained:
 
     Attributes
     ----------
-    checks : tuple of Check
     by_tile : dict of int to Figures
         Of the blocks kept back, by tile of the cloud.
     blocks, kept_back : int
@@ -368,13 +367,7 @@ class _Run:
         (self.folder / "checkpoint.new").replace(self.folder / CHECKPOINT)
 
     def resume(self) -> None:
-        """Load the checkpoint, if there is one.
-
-        Raises
-        ------
-        ParameterError
-            It belongs to another training, or is damaged.
-        """
+        """Load the checkpoint, if there is one; one that is damaged or belongs to another training is refused."""
         path = self.folder / CHECKPOINT
         if not path.exists():
             return

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from .. import checks
+from ..checks.density import occupied_squares, plausible
 from ..checks.doubts import doubting_scatter, strip_courses
 from ..checks.standard import warn_of_spacing
 from ..clouds.points import RailPoints
@@ -25,11 +26,10 @@ from ..rails import Centerline, RailLine, RailNetwork, TrackGeometry
 from ..raster import RailRaster
 from ..run.loop import Runner
 from ..run.tasks import Context, Task
-from ..squares.density import occupied_squares, plausible
-from ..squares.grid import Key, MemorySource, PointSource, SortedPoints, Square, around, assembled
 from ..squares.pieces import SquareRails, rows_in_frame
 from ..squares.remeasuring import measure_rails
 from ..squares.steps import clean_square, engine_for, rails_of_square, square_side, whole_rails
+from ..tiles.grid import Key, MemorySource, PointSource, SortedPoints, Square, around, assembled
 from ..tracks.centerlines import tracks_of
 from ..tracks.geometry import measure_track_geometry
 from ..tracks.parallels import widths_by_gauge

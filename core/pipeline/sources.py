@@ -25,10 +25,10 @@ from ..rails import SearchFigures
 from ..run.loop import Runner
 from ..run.tasks import Context
 from ..scratch import scratch_folder
-from ..squares.grid import SortedPoints
-from ..squares.spool import Census, SpooledFile, gather, spool_file
 from ..squares.steps import square_side
 from ..standards import RAIL_CLASS
+from ..tiles.grid import SortedPoints
+from ..tiles.spool import Census, SpooledFile, gather, spool_file
 
 READING = 0.2
 """Run time of sorting rail points relative to that of the walk, for the progress."""

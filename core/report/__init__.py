@@ -1,8 +1,7 @@
 """The report: a page that shows at a glance whether a result is good, and where it is not."""
 
 from .alignment import build_alignment_page
-from .listing import Finding, list_findings, summary
 from .origin import Origin
 from .page import build_page
 
-__all__ = ["Finding", "Origin", "build_alignment_page", "build_page", "list_findings", "summary"]
+__all__ = ["Origin", "build_alignment_page", "build_page"]

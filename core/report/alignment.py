@@ -14,8 +14,10 @@ import numpy as np
 
 from ..alignment.deviations import Deviations
 from ..alignment.elements import Alignment, CantElement, Element, PlanElement, VerticalElement
-from ..alignment.equations import Piece, stations_of
-from .markup import figure, largest, legend, made, metres, page, rms, section, table, tag, text, tiles
+from ..alignment.stations import StationRange, stations_of
+from ..checks.findings import largest, rms
+from ..progress import metres
+from .markup import figure, legend, made, page, section, table, tag, text, tiles
 from .origin import stated
 from .plots import LEFT, SPACE, TICKS_ACROSS, WIDTH, Curve, Frame, Panel, across, bottom_of, broken, round_up
 
@@ -50,7 +52,7 @@ ALIGNMENT_STYLE = """
 svg .frame { fill: none; stroke: var(--line); }
 svg .design { fill: none; stroke: #f4a261; stroke-width: 5; stroke-linejoin: round; opacity: 0.75; }
 svg .jump { stroke: var(--unsure); stroke-width: 1.4; stroke-dasharray: 4 3; }
-svg.alignment { margin: 0 0 14px; break-inside: avoid; }
+svg.alignment { margin-bottom: 14px; }
 svg rect.element { stroke: var(--paper); stroke-width: 1; }
 svg rect.line { fill: #b0bec5; }
 svg rect.clothoid { fill: #f8bf7f; }
@@ -61,9 +63,8 @@ i.element { height: 10px; }
 i.line { background: #b0bec5; }
 i.clothoid { background: #f8bf7f; }
 i.arc { background: #90bdf0; }
-@page { size: A4 landscape; margin: 12mm; }
-@media print { main { max-width: none; padding: 0; } section { break-inside: auto; }
-               * { print-color-adjust: exact; -webkit-print-color-adjust: exact; } }
+@page { size: A4 landscape; }
+@media print { section { break-inside: auto; } }
 """
 """Rules besides those of all pages."""
 
@@ -152,9 +153,9 @@ def _row(number: int, one: Element) -> tuple[str, ...]:
 def _ends(one: Element) -> tuple[str, str]:
     """Write radius, gradient or cant at start and end."""
     if isinstance(one, CantElement):
-        return f"{1000 * one.cant_from_m:+.1f} mm", f"{1000 * one.cant_to_m:+.1f} mm"
+        return figure(1000 * one.cant_from_m, "+.1f"), figure(1000 * one.cant_to_m, "+.1f")
     if isinstance(one, VerticalElement):
-        return f"{1000 * one.grade_from:+.3f} ‰", f"{1000 * one.grade_to:+.3f} ‰"
+        return figure(1000 * one.grade_from, "+.3f", "‰"), figure(1000 * one.grade_to, "+.3f", "‰")
     start, end = (f"R {1 / bend:,.2f} m" if bend else "straight" for bend in (one.k_from, one.k_to))
     return start, end
 
@@ -269,12 +270,12 @@ def _words(one: PlanElement) -> str:
 def _axis(alignment: Alignment, row: tuple[float, float], top: float, bottom: float) -> Iterator[str]:
     """Draw the kilometres, or the metres along the track where they are unknown, through all panels."""
     stations = stations_of(alignment)
-    pieces = stations.pieces if stations else (Piece(0.0, 0.0),)
+    pieces = stations.pieces if stations else (StationRange(0.0, 0.0),)
     name = "km" if stations else "m"
     yield tag("text", text(name), x=LEFT - 8, y=SPACE - 8, class_="tick end")
     yield tag("text", text(name), x=LEFT - 8, y=bottom + 16, class_="tick end")
     step = round_up((row[1] - row[0]) / TICKS_ACROSS)
-    for piece, after in zip(pieces, [*pieces[1:], Piece(np.inf, 0.0)]):
+    for piece, after in zip(pieces, [*pieces[1:], StationRange(np.inf, 0.0)]):
         start, end = max(piece.s, row[0]), min(after.s, row[1])
         if piece.s > row[0] and piece.s < row[1]:
             yield tag("line", **_vertical(piece.s, row, top, bottom), class_="jump")

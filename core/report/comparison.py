@@ -6,8 +6,10 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from ..checks.findings import known, largest, rms
 from ..comparison.tracks import BOTH, EXTRA, MISSING, SURE, LineDifferences, TrackComparison
-from .markup import figure, known, largest, made, metres, page, rms, section, table, tag, text, tiles, verdict_box
+from ..progress import metres
+from .markup import figure, made, page, section, table, tag, text, tiles, verdict_box
 from .plots import LEFT, PANEL, RIGHT, SPACE, WIDTH, Curve, Frame, Panel, draw_panels, picture, round_up
 
 BINS = 40
@@ -19,6 +21,8 @@ SHOWN_SHARE = 99.0
 MIN_SPAN_MM = 4.0
 """Smallest range of a distribution or profile, so that noise does not look alarming."""
 
+LIMIT = f"{SURE:g} standard errors"
+
 NOTES = (
     "Differences are the later survey minus the reference: across, positive to the left of the reference, and in "
     "height, positive above it. They contain the constant shift. Cant is the left rail minus the right one.",
@@ -27,13 +31,11 @@ NOTES = (
 )
 
 
-def build_comparison(found: TrackComparison, counts_shift: bool, source: str, facts: Mapping[str, str]) -> str:
+def build_comparison(found: TrackComparison, source: str, facts: Mapping[str, str]) -> str:
     """Return the page about a comparison, a complete HTML document.
 
     Parameters
     ----------
-    counts_shift : bool
-        Whether the constant shift counts as a movement.
     source : str
         Names of both surveys.
     facts : mapping of str to str
@@ -43,40 +45,50 @@ def build_comparison(found: TrackComparison, counts_shift: bool, source: str, fa
         f"Comparison: {source}",
         "Comparison of tracks",
         source,
-        _verdict(found, counts_shift),
+        _verdict(found),
         _tiles(found),
         section("Differences", table(HEADINGS, _rows(found)), *_distributions(found)),
         *_places(found),
-        *(_profiles(line, counts_shift) for line in found.lines if (line.state == BOTH).sum() > 1),
+        *(_profiles(line, found.counts_shift) for line in found.lines if (line.state == BOTH).sum() > 1),
         made(facts, NOTES),
     )
 
 
 def verdict_on(found: TrackComparison) -> str:
-    """Return in words how much has moved."""
+    """Return in words how much has moved, and by how much all of the later survey is shifted if that shows."""
     compared_m = found.length_of(BOTH)
     if not compared_m:
         return "The two surveys have no line in common."
+    shift = f"The later survey is shifted by {_shift(found)}; apart from that, " if _is_shifted(found) else ""
     if not found.moved_m:
-        return f"Nothing has moved by more than {SURE:g} standard errors on {metres(compared_m)}."
+        return f"{shift}{'n' if shift else 'N'}othing has moved by more than {LIMIT} on {metres(compared_m)}."
     moved = f"{metres(found.moved_m)} of {metres(compared_m)} ({100 * found.moved_m / compared_m:.1f} %)"
-    return f"{moved} have moved by more than {SURE:g} standard errors."
+    return f"{shift}{moved} have moved by more than {LIMIT}."
+
+
+def _is_shifted(found: TrackComparison) -> bool:
+    """Return whether a constant shift that is left out of account exceeds the limit of a movement anywhere."""
+    return not found.counts_shift and any(line.shifted.any() for line in found.lines)
 
 
 def describe_shift(found: TrackComparison) -> str:
     """Return the constant shift in words."""
-    east, north = 1000 * found.shift.plan_m
     if not found.values("across_mm").size:
         return "Without common lines, no constant shift is known."
-    height = f", {1000 * found.shift.up_m:+.1f} mm up" if np.isfinite(found.shift.up_m) else ""
     part = "" if found.shift.both else ", of which only the part across the tracks shows"
-    return f"Constant shift of the later survey: {east:+.1f} mm east, {north:+.1f} mm north{height}{part}."
+    return f"Constant shift of the later survey: {_shift(found)}{part}."
 
 
-def _verdict(found: TrackComparison, counts_shift: bool) -> str:
+def _shift(found: TrackComparison) -> str:
+    """Return the components of the constant shift."""
+    components = zip((*found.shift.plan_m, found.shift.up_m), ("east", "north", "up"))
+    return ", ".join(f"{figure(1000 * size_m, '+.1f')} {way}" for size_m, way in components if np.isfinite(size_m))
+
+
+def _verdict(found: TrackComparison) -> str:
     reasons = [
         describe_shift(found),
-        "It counts as a movement." if counts_shift else "It does not count as a movement.",
+        "It counts as a movement." if found.counts_shift else "It does not count as a movement.",
     ]
     if np.isfinite(found.estimated_m):
         reasons.append(
@@ -86,7 +98,7 @@ def _verdict(found: TrackComparison, counts_shift: bool) -> str:
     for state, words in ((MISSING, "of the reference is missing in the later survey"), (EXTRA, "is new in it")):
         if found.length_of(state):
             reasons.append(f"{metres(found.length_of(state))} {words}.")
-    kind = "fair" if found.moved_m or not found.length_of(BOTH) else "good"
+    kind = "fair" if found.moved_m or _is_shifted(found) or not found.length_of(BOTH) else "good"
     return verdict_box(kind, verdict_on(found), reasons)
 
 
@@ -163,7 +175,7 @@ def _sections(line: LineDifferences) -> Iterator[tuple[object, ...]]:
         for start_m, end_m, stations in line.sections(which):
             off_mm = (largest(getattr(line, name)[stations]) for name in ("across_mm", "height_mm"))
             place = f"{start_m:,.1f} to {end_m:,.1f} m"
-            yield (what, line.line_id, place, metres(end_m - start_m), *(figure(one, unknown="") for one in off_mm))
+            yield (what, line.name, place, metres(end_m - start_m), *(figure(one, unknown="") for one in off_mm))
 
 
 def _profiles(line: LineDifferences, counts_shift: bool) -> str:
@@ -184,6 +196,5 @@ def _profiles(line: LineDifferences, counts_shift: bool) -> str:
             curves.append(Curve(line.chainage_m, values))
             unit = "[mm]; green: limits of a movement" if limits else "[mm]"
             panels.append(Panel(name, unit, curves, MIN_SPAN_MM))
-    return section(
-        f"Line {line.line_id}", draw_panels(f"Differences of line {line.line_id}", panels, along, "chainage [m]")
-    )
+    drawn = draw_panels(f"Differences of {line.name}", panels, along, "chainage [m]")
+    return section(f"{line.name[:1].upper()}{line.name[1:]}", drawn)

@@ -11,9 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..checks.findings import GAUGE_OFF_MM, GAUGE_SIGMAS, UNSUPPORTED, UNSURE_MM, TrackFindings, gauge_off
+from ..progress import metres
 from ..tracks.geometry import TWIST_BASE_M
-from .findings import GAUGE_OFF_MM, UNSUPPORTED, UNSURE_MM, TrackFindings
-from .markup import metres, note, tag, text
+from .markup import note, tag, text
 
 MAX_LIMIT_MM = 500
 """Largest limit for which lengths are held: more than the cant of any track."""
@@ -44,8 +45,9 @@ SCRIPT = """
 
 NOTE = (
     "Change a limit, in whole millimetres, and the lengths beyond it are counted again, in this page only. Deviations "
-    "count to either side. Stations where a rail has no points are left out. Limits of cant and twist depend on line, "
-    "speed and standard: enter yours."
+    f"count to either side, those of the gauge only where they exceed {GAUGE_SIGMAS:g} standard errors: smaller ones "
+    "may be errors of the measurement. Stations where a rail has no points are left out. Limits of cant and twist "
+    "depend on line, speed and standard: enter yours."
 )
 
 
@@ -76,6 +78,11 @@ class Quantity:
         }
         return np.where(track.doubtful[UNSUPPORTED], np.nan, values[self.name])
 
+    def sure(self, track: TrackFindings) -> np.ndarray:
+        """Return those values, (n,) mm, but 0 where a deviation of the gauge may be an error."""
+        values = self.of(track)
+        return np.minimum(values, gauge_off(track.geometry, track.nominal_mm)) if self.name == "gauge" else values
+
 
 QUANTITIES = (
     Quantity("gauge", "Gauge, off nominal", GAUGE_OFF_MM),
@@ -97,13 +104,6 @@ def limits_table(tracks: Sequence[TrackFindings]) -> str:
 
 def lengths_beyond(values_mm: np.ndarray, length_m: np.ndarray) -> np.ndarray:
     """Return the lengths with values above 0, 1, 2 mm and so on up to the largest value, (k,) metres.
-
-    Parameters
-    ----------
-    values_mm : (n,) array
-        None below 0; NaN counts nowhere.
-    length_m : (n,) array
-        Length that each value stands for.
 
     Examples
     --------
@@ -127,7 +127,7 @@ def _input(quantity: Quantity) -> str:
 def _row(quantity: Quantity, track: TrackFindings) -> str:
     """Write how much of a track is beyond the limit, with the lengths beyond every other one."""
     values, cells_m = quantity.of(track), track.geometry.cells_m
-    beyond_m = lengths_beyond(values, cells_m)
+    beyond_m = lengths_beyond(quantity.sure(track), cells_m)
     length_m = float(cells_m[np.isfinite(values)].sum())
     largest = at = over = share = ""
     if length_m:

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from html import escape
+from itertools import compress
 
 import numpy as np
+
+from ..progress import written
 
 STYLE = """
 :root { --ink: #1d2733; --soft: #5d6b7a; --line: #dfe5ec; --paper: #ffffff; --wash: #f5f7fa; --track: #1565c0;
@@ -13,10 +16,10 @@ STYLE = """
 * { box-sizing: border-box; }
 body { margin: 0; background: var(--wash); color: var(--ink); font: 15px/1.5 system-ui, "Segoe UI", Roboto,
        "Helvetica Neue", "Noto Sans", Arial, sans-serif; }
-main { max-width: 1120px; margin: 0 auto; padding: 28px 20px 60px; }
+main { padding: 28px 20px 60px; }
 h1 { font-size: 26px; margin: 0; }
 h2 { font-size: 18px; margin: 0 0 10px; }
-p { margin: 6px 0; }
+p { margin: 6px 0; max-width: 1080px; }
 .source { color: var(--soft); margin: 2px 0 18px; overflow-wrap: anywhere; }
 section, .verdict { background: var(--paper); border: 1px solid var(--line); border-radius: 10px; padding: 18px 20px;
           margin: 0 0 16px; }
@@ -37,7 +40,7 @@ th, td { padding: 5px 10px; text-align: right; border-bottom: 1px solid var(--li
 th { color: var(--soft); font-weight: 600; }
 th:first-child, td:first-child { text-align: left; }
 table.words td, table.words th { text-align: left; }
-svg { display: block; width: 100%; height: auto; }
+svg { display: block; width: 100%; max-width: 1400px; height: auto; margin: 0 auto; }
 svg text { font-size: 12px; fill: var(--soft); font-variant-numeric: tabular-nums; }
 svg .end { text-anchor: end; }
 svg .middle { text-anchor: middle; }
@@ -76,10 +79,14 @@ table.quantities th:nth-child(2), table.quantities td:nth-child(2) { text-align:
 dl { display: grid; grid-template-columns: max-content 1fr; gap: 2px 18px; margin: 0 0 12px; font-size: 14px; }
 dt { color: var(--soft); }
 dd { margin: 0; overflow-wrap: anywhere; }
-@media print { body { background: none; } .tall { max-height: none; }
-              section, .verdict, .tile { break-inside: avoid; } }
+@page { size: A4; margin: 12mm; }
+@media print { body { background: none; } main { padding: 0; } .scroll { overflow: visible; }
+               .tall { max-height: none; } .tall th { position: static; }
+               table { font-size: 11px; } th, td { white-space: normal; padding: 3px 6px; }
+               section, .verdict, .tile, tr, svg { break-inside: avoid; } h2 { break-after: avoid; }
+               * { print-color-adjust: exact; -webkit-print-color-adjust: exact; } }
 """
-"""Style sheet of all pages."""
+"""Style sheet of all pages. They are as wide as the window, and on paper every column of a table is seen."""
 
 
 def tag(name: str, *content: str, **attributes: object) -> str:
@@ -167,42 +174,20 @@ def legend(keys: Iterable[tuple[str, Mapping[str, str]]]) -> str:
 
 
 def table(headings: Iterable[str], rows: Iterable[Iterable[object]], class_: str = "scroll", kind: str = "") -> str:
-    """Return a table of escaped texts in a box of a class; of the `kind` "words", its cells begin on the left."""
-    head = tag("tr", *(tag("th", text(heading)) for heading in headings))
-    body = (tag("tr", *(tag("td", text(cell)) for cell in row)) for row in rows)
+    """Return a table of escaped texts in a box of a class; of the `kind` "words", its cells begin on the left.
+
+    Columns without a text in any row are left out.
+    """
+    cells = [[str(cell) for cell in row] for row in rows]
+    used = [any(column) for column in zip(*cells)]
+    head = tag("tr", *(tag("th", text(heading)) for heading in compress(headings, used)))
+    body = (tag("tr", *(tag("td", text(cell)) for cell in compress(row, used))) for row in cells)
     return tag("div", tag("table", tag("thead", head), tag("tbody", *body), class_=kind or None), class_=class_)
-
-
-def metres(length_m: float) -> str:
-    """Format a length for reading: 0.4 m, 39 m, 1,234 m, 12.3 km."""
-    if length_m >= 10_000:
-        return f"{length_m / 1000:,.1f} km"
-    return f"{length_m:.1f} m" if length_m < 10 else f"{length_m:,.0f} m"
 
 
 def figure(value: float, form: str = ".1f", unit: str = "mm", unknown: str = "unknown") -> str:
     """Format a number with its unit; another word stands for NaN."""
-    return f"{value:{form}} {unit}" if np.isfinite(value) else unknown
-
-
-def known(values: np.ndarray) -> np.ndarray:
-    """Return the values that are numbers, (k,)."""
-    return values[np.isfinite(values)]
-
-
-def median(values: np.ndarray) -> float:
-    """Return the median of the known values; NaN without any."""
-    return float(np.median(known(values))) if known(values).size else np.nan
-
-
-def rms(values: np.ndarray) -> float:
-    """Return the root mean square of the known values; NaN without any."""
-    return float(np.sqrt(np.mean(known(values) ** 2))) if known(values).size else np.nan
-
-
-def largest(values: np.ndarray) -> float:
-    """Return the known value that is furthest from 0, with its sign; NaN without any."""
-    return float(max(known(values).tolist(), key=abs, default=np.nan))
+    return f"{written(value, form)} {unit}" if np.isfinite(value) else unknown
 
 
 def _value(value: object) -> str:

@@ -28,7 +28,6 @@ class Origin:
     ----------
     paths : tuple of Path
         Files or folders of the cloud.
-    other_gauges : tuple of Gauge
     command : str
         Repeats the run.
     parameters : Parameters or None

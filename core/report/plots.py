@@ -89,7 +89,6 @@ class Panel:
     ----------
     heading, unit : str
         The unit as it is written beside the heading.
-    curves : sequence of Curve
     min_span : float
         Smallest range of the panel, so that noise does not look alarming.
     band : tuple of float or None

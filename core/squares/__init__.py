@@ -1,1 +1,1 @@
-"""Clouds of any size: squares with overlap, points on disk, and lines joined across borders."""
+"""The steps on one square of a cloud, and lines joined across the borders of squares."""

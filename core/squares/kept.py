@@ -26,9 +26,9 @@ from ..raster import RailRaster
 from ..run.tasks import Context, Task
 from ..run.version import version
 from ..scratch import discard, scratch_folder, sweep
-from .grid import Square
+from ..tiles.grid import Square
+from ..tiles.spool import SpooledPoints
 from .pieces import SquareRails
-from .spool import SpooledPoints
 
 KEPT = {one.__name__: one for one in (RailRaster, SquareRails, Square, LocalFrame, RailLine, Support)}
 """Classes of which results consist, besides numbers, texts, arrays, tuples and mappings."""

@@ -14,7 +14,7 @@ from ..frame import LocalFrame
 from ..lines.finishing import SAME_RAIL_M
 from ..polyline import Polyline, interpolate, project, runs
 from ..rails import RailLine
-from .grid import HALO_M, Square
+from ..tiles.grid import HALO_M, Square
 
 CUT_STEP_M = 0.25
 """Spacing of the stations at which lines are cut and compared."""
@@ -41,7 +41,6 @@ class SquareRails:
 
     Attributes
     ----------
-    square : Square
     rails : tuple of RailLine
         In local metres of the square, cut `HALO_M` outside its border; rails without any length inside are left out.
     nodes : (n, 2) array

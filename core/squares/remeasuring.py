@@ -17,8 +17,8 @@ from ..progress import SILENT, Progress
 from ..rails import RailLine
 from ..run.loop import Runner
 from ..run.tasks import Context, Task
+from ..tiles.grid import Key, PointSource, Square, Tiling, lay_out
 from ..tracks.geometry import PROFILE_SIGMA_M
-from .grid import Key, PointSource, Square, Tiling, lay_out
 
 CONTEXT_M = 10.0
 """Distance beyond a square over which its rails are measured as well: the disc reaches 1 m, and what is further away

@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 from ..frame import LocalFrame
 from ..lines.finishing import SAME_RAIL_M, united
 from ..rails import RailLine
-from .grid import HALO_M, Key, Square, around
+from ..tiles.grid import HALO_M, Key, Square, around
 from .pieces import (
     CUT_STEP_M,
     HOLE_M,

@@ -30,9 +30,9 @@ from ..parameters import ALIGNED, Parameters
 from ..progress import SILENT, Progress
 from ..rails import RailLine
 from ..raster import TILE, RailRaster, cell_size, rasterize
+from ..tiles.grid import HALO_M, OVERLAP_M, Key, PointSource, Square, mosaic, own_tiles
 from ..tracks.parallels import widths_by_gauge
 from ..vectorize import vectorize
-from .grid import HALO_M, OVERLAP_M, Key, PointSource, Square, mosaic, own_tiles
 from .pieces import SquareRails, trim
 from .seams import join
 

@@ -6,13 +6,14 @@ See docs/method.md section 4.9.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from ..lines.ends import Bridge, bridge, cut_back, even_points
 from ..lines.network import LineNetwork
-from .junctions import ends_by_node, unsteadiness
+from .junctions import DIRECTION_M, ends_by_node, unsteadiness
 
 MAX_MERGED_M = 14.0
 """Largest length that two crossing rails share. Heads of 76 mm in cells of 40 mm share 9 m at 1:26.5, and wing rails
@@ -28,6 +29,10 @@ because four legs that meet are known to belong together."""
 DECIDING_M = 12.0
 """Length of each leg that decides its continuation. A rail of a 1:26.5 frog that continued as the other rail would be
 off a constant curvature by 16 mm over this length; stairs make half as much."""
+
+WINGS_M = (0.0, 1.0, 2.0, 3.0)
+"""Further lengths cut off all legs before they are paired, in this order: wing rails run beside the rails for up to 3 m
+on the side of the nose, and where they hide it from a scanner, legs are drawn along them."""
 
 _PAIRINGS = (((0, 2), (1, 3)), ((0, 3), (1, 2)), ((0, 1), (2, 3)))
 
@@ -104,17 +109,33 @@ def _cut_off(network: LineNetwork) -> list[dict[int, float]]:
 
 def _best_pairing(network: LineNetwork, legs: Mapping[int, float]) -> dict[tuple[int, int], Bridge]:
     """Connect four legs in the two pairs that keep the curvature of both rails best; empty if no rails could follow."""
+    lengths = network.lengths()
+    shortest_m = min(lengths[end // 2] - skip_m for end, skip_m in legs.items())
+    options = [
+        option
+        for wing_m in WINGS_M
+        if wing_m == 0 or shortest_m > wing_m + DIRECTION_M
+        for option in _options(network, {end: skip_m + wing_m for end, skip_m in legs.items()}, wing_m)
+    ]
+    if not options:
+        return {}
+    _, steadiest = min(options, key=lambda option: option[0])
+    return next(bridges for _, bridges in options if bridges.keys() == steadiest.keys())
+
+
+def _options(
+    network: LineNetwork, legs: Mapping[int, float], wing_m: float
+) -> Iterator[tuple[float, dict[tuple[int, int], Bridge]]]:
+    """Yield each way to connect four legs in two pairs that rails could follow, with its unsteadiness squared, m²."""
     cut = {end: cut_back(network.from_end(end), skip_m) for end, skip_m in legs.items()}
-    options = []
     ends = list(legs)
     for (a, b), (c, d) in _PAIRINGS:
         pairs = (ends[a], ends[b]), (ends[c], ends[d])
         found = {pair: bridge(cut[pair[0]], cut[pair[1]], misfit_m=MISFIT_M) for pair in pairs}
-        bridges = {pair: curve for pair, curve in found.items() if curve is not None}
+        bridges = {
+            pair: replace(curve, cuts_m=(curve.cuts_m[0] + wing_m, curve.cuts_m[1] + wing_m))
+            for pair, curve in found.items()
+            if curve is not None
+        }
         if len(bridges) == len(pairs):
-            options.append(bridges)
-    return min(
-        options,
-        key=lambda found: sum(unsteadiness(cut[one], cut[other], DECIDING_M) ** 2 for one, other in found),
-        default={},
-    )
+            yield sum(unsteadiness(cut[one], cut[other], DECIDING_M) ** 2 for one, other in pairs), bridges

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from .designs import Design, canted_curve, curved_line, drawn_together, yard
 from .flight import AirborneCloud, Flight, fly
-from .landscapes import countryside, railway
+from .landscapes import countryside
 
 LENGTH_M = 200.0
 """Length of a scene that has no reason for another one: 20 stations on each track."""
@@ -31,7 +31,6 @@ class FlownScene:
     flight : Flight
     cloud : AirborneCloud
     guides : list of (k, 2) array
-        Without any, guides are proposed.
     meant : sequence of int or None
         Track that each guide means; None where none is.
     """
@@ -39,8 +38,8 @@ class FlownScene:
     design: Design
     flight: Flight
     cloud: AirborneCloud
-    guides: list[np.ndarray] = field(default_factory=list)
-    meant: Sequence[int | None] = ()
+    guides: list[np.ndarray]
+    meant: Sequence[int | None]
 
 
 def flown(design: Design, flight: Flight, seed: int, missing: int = 0) -> FlownScene:
@@ -93,11 +92,6 @@ def misleading(seed: int) -> FlownScene:
     return FlownScene(design, Flight(), cloud, guides, (None,) * len(guides))
 
 
-def proposed(seed: int) -> FlownScene:
-    """Return a railway among roads and fields, without guides."""
-    return replace(flown(replace(railway(seed), width_m=WIDTH_M), Flight(5.0), seed), guides=[], meant=())
-
-
 FLOWN: dict[str, Callable[[int], FlownScene]] = {
     "line": lambda seed: line(seed, Flight()),
     "wide beam": lambda seed: line(seed, Flight(20.0, 0.5)),
@@ -110,6 +104,5 @@ FLOWN: dict[str, Callable[[int], FlownScene]] = {
     "no guide": no_guide,
     "twins": twins,
     "no track": misleading,
-    "proposed": proposed,
 }
 """Scenes by name, made from a seed."""

@@ -1,13 +1,11 @@
-"""Landscapes in which tracks are searched without guides: what resembles a track beside one, or without any."""
+"""Landscapes without a railway: what resembles a track."""
 
 from __future__ import annotations
-
-from dataclasses import replace
 
 import numpy as np
 
 from ..curves import Element, trace
-from .designs import Design, curved_line
+from .designs import Design
 from .ground import STEP_M, Axis, Band, World
 
 LENGTH_M, WIDTH_M = 300.0, 70.0
@@ -38,24 +36,15 @@ CAR_EVERY_M, CAR_LENGTH_M = 2.6, 1.8
 """Distance of parked cars from each other, and their width, in a row."""
 
 FIRST_M, STEP_ASIDE_M = 14.0, 9.0
-"""Distance of the things from a railway, and from each other."""
+"""Distance of the things from the middle line, and from each other."""
 
 
 def countryside(seed: int) -> Design:
     """Return a landscape without a railway: roads, paths, hedges, ditches, fields and a car park along a curve."""
     rng = np.random.RandomState(seed)
     middle = _middle(rng)
-    world = World([], _things(middle, 0.0, rng), seed=seed)
+    world = World([], _things(middle, rng), seed=seed)
     return Design(world, (), middle.xyz[::4, :2], width_m=WIDTH_M)
-
-
-def railway(seed: int) -> Design:
-    """Return a double track with the same things beside it."""
-    rng = np.random.RandomState(seed)
-    design = curved_line(seed, LENGTH_M)
-    beside = Axis.of_track(design.tracks[0])
-    design.world.bands.extend(_things(beside, -0.9, rng))
-    return replace(design, width_m=WIDTH_M)
 
 
 def _middle(rng: np.random.RandomState) -> Axis:
@@ -65,7 +54,7 @@ def _middle(rng: np.random.RandomState) -> Axis:
     return Axis(np.column_stack([curve.xy, np.zeros(len(curve.xy))]), curve.heading, np.zeros(len(curve.xy)))
 
 
-def _things(middle: Axis, up_m: float, rng: np.random.RandomState) -> list[Band]:
+def _things(middle: Axis, rng: np.random.RandomState) -> list[Band]:
     """Lay all things side by side in an order that the seed chooses, on both sides of a line."""
     names = [*HALVES, "field"]
     bands: list[Band] = []
@@ -75,7 +64,7 @@ def _things(middle: Axis, up_m: float, rng: np.random.RandomState) -> list[Band]
         wide_m = FIELD_M if name == "field" else 0.0
         left_m = side * (sides[side] + wide_m)
         sides[side] += STEP_ASIDE_M + 2 * wide_m
-        bands += _laid(name, middle.beside(left_m, up_m))
+        bands += _laid(name, middle.beside(left_m))
     return bands
 
 

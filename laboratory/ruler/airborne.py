@@ -1,4 +1,4 @@
-"""How far tracks fitted in airborne clouds lie from the true ones, and how well guides for them are proposed."""
+"""How far tracks fitted in airborne clouds lie from the true ones."""
 
 from __future__ import annotations
 
@@ -13,8 +13,7 @@ from scipy.spatial import cKDTree
 
 from ...core.airborne.files import survey_files
 from ...core.airborne.fitting import REASONS, STATION_M
-from ...core.airborne.proposals import Proposals, propose_guides
-from ...core.airborne.run import Run
+from ...core.airborne.reading import Run
 from ...core.airborne.survey import SWITCH, AirborneTrack, Guide, Survey
 from ...core.clouds.points import ask
 from ...core.parameters import AirborneParameters
@@ -22,14 +21,10 @@ from ...core.polyline import Polyline
 from ...core.run.loop import Runner
 from ..airborne.catalogue import FlownScene
 from ..airborne.designs import SPACING_M, Design
-from ..airborne.ground import STEP_M
 from ..airborne.write import ORIGIN, write_airborne
 
 GAUGE_M, CLASSES = 1.435, (1, 2)
 """Gauge of all tracks, metres, and the classes that are read."""
-
-ON_TRACK_M = 0.5
-"""Distance from a track within which a proposed guide is right, metres."""
 
 UNSEEN = ("", "empty", "hidden", "misled", "unsure", "twin", "aside", "sparse")
 """Short names of `REASONS`, by which stations that are not seen are counted."""
@@ -130,20 +125,11 @@ def compare_stations(
 def surveyed(scene: FlownScene) -> Survey:
     """Survey a scene along its guides, from files and back."""
     guides = [Guide(1 + number, one + ORIGIN[:2]) for number, one in enumerate(scene.guides)]
-    with tempfile.TemporaryDirectory() as folder:
-        return survey_files(_run(scene, Path(folder)), guides)
-
-
-def proposed(scene: FlownScene) -> Proposals:
-    """Propose guides for a scene."""
-    with tempfile.TemporaryDirectory() as folder:
-        return propose_guides(_run(scene, Path(folder)))
-
-
-def _run(scene: FlownScene, folder: Path) -> Run:
-    write_airborne(scene.cloud, folder / "cloud.las")
     parameters = AirborneParameters(GAUGE_M, SPACING_M - GAUGE_M, footprint_m=scene.flight.footprint_m)
-    return Run(ask(folder / "cloud.las", CLASSES), parameters, folder / "points", Runner())
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        write_airborne(scene.cloud, folder / "cloud.las")
+        return survey_files(Run(ask(folder / "cloud.las", CLASSES), parameters, folder / "points", Runner()), guides)
 
 
 def survey_figures(scene: FlownScene) -> dict[str, float]:
@@ -186,46 +172,3 @@ def compared(survey: Survey, track: AirborneTrack, design: Design, number: int) 
         xyz, track.seen.astype(bool), track.sigma_mm / 1000, at_switch, design.truth(number), others
     )
     return found[~design.is_hidden(number, found.along_m)]
-
-
-@dataclass(frozen=True)
-class Guided:
-    """How well guides are proposed: lengths in metres.
-
-    Attributes
-    ----------
-    right_m, visible_m : float
-        Length of tracks with a proposed guide, and of all that are not hidden.
-    false_m : float
-        Length of guides without a track.
-    """
-
-    right_m: float
-    visible_m: float
-    false_m: float
-
-
-def compare_guides(scene: FlownScene, found: Proposals) -> Guided:
-    """Compare proposed guides with the true tracks of a scene."""
-    design = scene.design
-    guides = [Polyline(found.frame.to_crs(one.xyz)[:, :2] - ORIGIN[:2]).resampled(1.0).xyz for one in found.guides]
-    tracks = [design.truth(number)[:, :2] for number in range(len(design.tracks))]
-    visible = [track[~design.is_hidden(number, np.arange(len(track)) * STEP_M)] for number, track in enumerate(tracks)]
-    return Guided(
-        STEP_M * float(sum(_near(one, guides).sum() for one in visible)),
-        STEP_M * float(sum(map(len, visible))),
-        float(sum((~_near(one, tracks)).sum() for one in guides)),
-    )
-
-
-def guide_figures(scene: FlownScene) -> dict[str, float]:
-    """Propose guides for a scene, and measure them: the share of tracks in per cent, and false metres."""
-    found = compare_guides(scene, proposed(scene))
-    return {"found %": 100 * found.right_m / found.visible_m, "wrong m": found.false_m}
-
-
-def _near(places: np.ndarray, lines: Sequence[np.ndarray]) -> np.ndarray:
-    """Return which places, (n, 2), lie on lines, (n,) bool."""
-    if not lines:
-        return np.zeros(len(places), dtype=bool)
-    return cKDTree(np.concatenate(lines)).query(places)[0] < ON_TRACK_M

@@ -27,7 +27,7 @@ from ..scenes.raw import RawScene
 from ..scenes.raw_catalogue import AIR, RAW_SCENES
 from ..scenes.scene import Scene
 from ..scenes.whole_rails import WHOLE
-from .airborne import guide_figures, survey_figures
+from .airborne import survey_figures
 from .alignments import fit_figures
 from .classification import score
 from .lines import Match, match
@@ -148,7 +148,7 @@ def figures_of(place: str, scene: AnyScene, variant: Variant = PLAIN) -> Figures
     if isinstance(scene, TrackScene):
         return fit_figures(scene)
     if isinstance(scene, FlownScene):
-        return survey_figures(scene) if scene.guides else guide_figures(scene)
+        return survey_figures(scene)
     if isinstance(scene, RawScene):
         return _raw_figures(scene, wide=place[len(RAW) :] in AIR)
     return line_figures(scene, extract_rails([scene.rail_points()], parameters_of(scene, variant)))

@@ -17,7 +17,7 @@ from ...core.labelling.finding import search_square
 from ...core.progress import SILENT, Progress
 from ...core.rails import SearchFigures
 from ...core.run.tasks import Context, Once
-from ...core.squares.grid import Key, Tiling
+from ...core.tiles.grid import Key, Tiling
 
 
 class Part(NamedTuple):

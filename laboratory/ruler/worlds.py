@@ -16,6 +16,8 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
+from ...core.checks.findings import examine
+from ...core.checks.listing import Finding, list_findings, verdict
 from ...core.clouds.points import ask
 from ...core.comparison.pieces import cut
 from ...core.errors import RailExtractError
@@ -24,9 +26,6 @@ from ...core.pipeline import extract_files
 from ...core.pipeline.sources import Classified, Raw
 from ...core.polyline import Chords, Polyline
 from ...core.rails import RailNetwork
-from ...core.report import Finding, list_findings
-from ...core.report.findings import examine
-from ...core.report.listing import verdict
 from ...core.run.loop import Runner
 from ...core.standards import RAIL_CLASS, SEARCHED_CLASSES
 from ..worlds.world import World

@@ -78,3 +78,11 @@ def rough(xyz: np.ndarray, rng: np.random.RandomState, bed_m: float = 0.012, bar
     lifted = xyz.copy()
     lifted[:, 2] += np.where(xyz[:, 2] > 0.5 * TOP_M, bar_m, bed_m) * rng.standard_normal(len(xyz))
     return lifted
+
+
+def track_beside_kerb(per_m2: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return 12 m of track in four areas, with a kerb as high as the rails, (n, 3), and which points are on heads."""
+    rng = np.random.RandomState(3)
+    xyz, on = with_track(flat(12.0, rng=rng, per_m2=per_m2), 1.435, 0.072, 0.3)
+    xyz, kerb = with_bar(xyz, 0.5, 0.3, 3.0)
+    return rough(xyz, rng), on & ~kerb

@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 from ...core.polyline import Polyline
 from ..scenes.raw import RawScene
 from ..scenes.raw_scanner import MIXED
-from ..scenes.raw_world import FASTENING, FOOT, GROUND, GUARD, HEAD, PLANT, SLEEPER
+from ..scenes.raw_world import FASTENING, FOOT, GROUND, GUARD, HEAD, PAVEMENT, PLANT, SLEEPER
 from ..scenes.scene import GROUND as GROUND_CLASS
 from ..scenes.scene import RAIL, UNCLASSIFIED, Scene
 from ..scenes.whole_rails import ABOVE_M, BELOW_M, BESIDE_M, STEP_M
@@ -28,6 +28,19 @@ LEAK_M = 0.25
 
 GAP_M = (0.3, 4.0)
 """Lengths of sections of a rail that were not classified."""
+
+STRIP_M = {HEADS: (0.05, 0.07), FACES: (0.06, 0.09), WHOLE: (0.08, 0.12)}
+"""Half the width of the strip that is classified along a rail in a survey from above: nobody sees the edges of a head
+there, but a ridge that is wider than it by the beam, or by the blur of images, on either side."""
+
+RIDGE_M = 0.08
+"""Height of this ridge, of which the flanks are classified with the head: half of what a rail stands out of its bed."""
+
+ASIDE_M = 0.01
+"""Largest distance of the middle of such a strip from the axis of its rail."""
+
+IN_STRIP = (HEAD, FOOT, GROUND, SLEEPER, FASTENING, PAVEMENT)
+"""What the points of such a strip lie on: a train and plants on it are seen to be something else."""
 
 
 @dataclass(frozen=True)
@@ -50,6 +63,8 @@ class Classification:
         Share of the points on rails that are not.
     gaps : int
         Sections of each rail without points, at most.
+    strip_m, aside_m : float
+        See `STRIP_M` and `ASIDE_M`.
     """
 
     style: str
@@ -63,6 +78,8 @@ class Classification:
     weeds: float
     missed: float
     gaps: int
+    strip_m: float
+    aside_m: float
 
 
 def draw_classification(seed: int) -> Classification:
@@ -84,11 +101,17 @@ def draw_classification(seed: int) -> Classification:
         weeds=rng.uniform(0.0, 0.5) if maybe(rng, 0.4) else 0.0,
         missed=rng.uniform(0.0, 0.4) if maybe(rng, 0.4) else 0.0,
         gaps=int(chosen(rng, {0: 50, 1: 20, 2: 20, 3: 10})),
+        strip_m=rng.uniform(*STRIP_M[style]),
+        aside_m=rng.uniform(0.0, ASIDE_M),
     )
 
 
-def classified(scene: RawScene, how: Classification, seed: int) -> Scene:
-    """Classify a raw world; of a survey by images, other classes are those of its ground filter."""
+def classified(scene: RawScene, how: Classification, seed: int, from_above: bool) -> Scene:
+    """Classify a raw world.
+
+    From above, heads are strips (see `STRIP_M`), and so are whole rails in images, whose other classes are those of
+    their ground filter.
+    """
     rng = stream(seed, "labels")
     chance = rng.random_sample(len(scene.kind))
     places, share, gap = _along(scene, how, rng)
@@ -96,15 +119,15 @@ def classified(scene: RawScene, how: Classification, seed: int) -> Scene:
     near = np.isfinite(distance_m)
     place = np.where(near, place, 0)
     above_m = scene.xyz[:, 2] - places[place, 2]
-    kind, crown = scene.kind, above_m > -CROWN_M
-    if scene.crests is not None:
-        # On a surface, nothing but the uppermost is seen, and a head is as high as it is drawn.
-        crown = np.ones(len(kind), dtype=bool)
-    rail = (kind == HEAD) & (crown | (chance < how.faces))
-    inside = (share[place] >= how.feet_from) & (share[place] <= how.feet_to)
-    rail |= (kind == FOOT) & inside & (chance < how.feet)
+    kind = scene.kind
+    if from_above and (how.style != WHOLE or scene.crests is not None):
+        rail = np.isin(kind, IN_STRIP) & _in_strips(scene, how, rng) & ((above_m > -RIDGE_M) | (how.style == WHOLE))
+    else:
+        rail = (kind == HEAD) & ((above_m > -CROWN_M) | (chance < how.faces))
+        inside = (share[place] >= how.feet_from) & (share[place] <= how.feet_to)
+        rail |= (kind == FOOT) & inside & (chance < how.feet)
+        rail |= (kind == MIXED) & how.mixed & (above_m < ABOVE_M) & (above_m > -BELOW_M) & (distance_m < BESIDE_M)
     rail |= (kind == GUARD) & how.guards & (above_m > -BELOW_M)
-    rail |= (kind == MIXED) & how.mixed & (above_m < ABOVE_M) & (above_m > -BELOW_M) & (distance_m < BESIDE_M)
     rail &= rng.random_sample(len(kind)) >= how.missed
     rail &= ~(gap[place] & near & (distance_m < LEAK_M))
     rail |= np.isin(kind, (GROUND, SLEEPER, FASTENING)) & (distance_m < LEAK_M) & (chance < how.leaks)
@@ -124,6 +147,14 @@ def classified(scene: RawScene, how: Classification, seed: int) -> Scene:
         strips=scene.strips,
         times=scene.times,
     )
+
+
+def _in_strips(scene: RawScene, how: Classification, rng: np.random.RandomState) -> np.ndarray:
+    """Return which points, (n,) bool, lie in strips along rails, each displaced by up to `aside_m`."""
+    lines = [Polyline(rail[:, :2]).resampled(STEP_M) for rail in scene.rails]
+    middles = [line.xy + rng.uniform(-how.aside_m, how.aside_m) * line.normals for line in lines]
+    distance_m, _ = cKDTree(np.concatenate(middles)).query(scene.xyz[:, :2], distance_upper_bound=1.0)
+    return distance_m <= how.strip_m
 
 
 def _along(

@@ -17,7 +17,7 @@ from .railway import Railway, draw_railway
 from .surroundings import TUNNEL, Surroundings, draw_surroundings
 from .surveys import Survey, draw_kind, draw_survey, marked
 
-VERSION = 6
+VERSION = 7
 """Changes when a seed gives another world: results of different versions are never mixed."""
 
 RAW, CLASSIFIED = "raw", "classified"
@@ -50,7 +50,9 @@ class World:
     @cached_property
     def classified(self) -> Scene | None:
         """The classified cloud; None of a raw one."""
-        return None if self.classification is None else classified(self.scene, self.classification, self.seed)
+        if self.classification is None:
+            return None
+        return classified(self.scene, self.classification, self.seed, self.survey.from_above)
 
     @property
     def heads(self) -> np.ndarray:

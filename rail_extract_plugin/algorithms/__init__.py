@@ -6,11 +6,7 @@ from ...core.jobs import JOBS
 from ...core.jobs.declaration import Job
 from .base import JobAlgorithm, RailAlgorithm
 from .check_installation import CheckInstallation
-from .frpdf_cleanup import FrpdfCleanup
 from .install_packages import InstallPackages
-from .rasterize_rail_points import RasterizeRailPoints
-from .station_along_axis import StationAlongAxis
-from .vectorize_rails import VectorizeRails
 
 
 def _of(job: Job) -> type[RailAlgorithm]:
@@ -18,16 +14,5 @@ def _of(job: Job) -> type[RailAlgorithm]:
     return type(job.name, (JobAlgorithm,), {"JOB": job, "__doc__": job.summary})
 
 
-OWN = {
-    algorithm.JOB.name: algorithm
-    for algorithm in (
-        RasterizeRailPoints,
-        FrpdfCleanup,
-        VectorizeRails,
-        StationAlongAxis,
-    )
-}
-"""Algorithms that only the toolbox has, by the name of their job."""
-
-ALGORITHMS = (*(OWN.get(job.name) or _of(job) for job in JOBS), InstallPackages, CheckInstallation)
+ALGORITHMS = (*map(_of, JOBS), InstallPackages, CheckInstallation)
 """The jobs, then the setup."""

@@ -286,17 +286,19 @@ class JobAlgorithm(RailAlgorithm):
         for sentence in result.sentences:
             progress.info(sentence)
         writers: dict[str, Callable[[], dict[str, str]]] = {
-            name: partial(_write_rasters, values, name, make) for name, make in result.rasters.items()
+            name: partial(_write_rasters, values, name, make, progress) for name, make in result.rasters.items()
         }
         writers.update(layer_writers(values, result.layers, result.frame))
         writers.update({name: partial(write_shown, values, make, name) for name, make in result.pages.items()})
         return {**write_each(writers, values), **result.figures}
 
 
-def _write_rasters(values: ParameterValues, name: str, make: Callable[[], Rasters | None]) -> dict[str, str]:
+def _write_rasters(
+    values: ParameterValues, name: str, make: Callable[[], Rasters | None], progress: Progress
+) -> dict[str, str]:
     """Write rasters if they are wanted, and not empty."""
     made = make() if values.wanted(name) else None
-    return {} if made is None else write_raster(values, name, *made)
+    return {} if made is None else write_raster(values, name, *made, progress.span(1, 1))
 
 
 def _is_page(definition: QgsProcessingParameterDefinition) -> bool:

@@ -32,7 +32,9 @@ JOB = declaration.Job(
     "skipped. An internet connection is required.\n\n"
     "PyTorch is optional: with it, the network can use a GPU, and the network of the paper runs faster than with "
     "OpenCV. With the smaller network, which is the default, a run on the sample takes as long with OpenCV. The "
-    "download is about 200 MB for the processor and several GB for an Nvidia GPU.",
+    "download is about 200 MB for the processor and several GB for an Nvidia GPU.\n\n"
+    "All files are compared with a list of checksums in the plugin, except the builds that only PyTorch's own index "
+    "has, CPU on Linux and CUDA on Windows: they are compared with the checksums of that index.",
     ("rail", "setup", "install", "python", "pip", "dependencies", "laspy", "opencv", "torch", "pytorch"),
     parameters=(
         Choice(
@@ -68,7 +70,7 @@ class InstallPackages(RailAlgorithm):
 
     def read(self, values: ParameterValues) -> Job:
         """Find what is missing."""
-        build = values.choice("TORCH")
+        build = values["TORCH"]
         if build == "CUDA" and sys.platform == "darwin":
             raise ParameterError("There is no CUDA on macOS: set TORCH to CPU.")
         needed = [package for package in PACKAGES if package.module not in OPTIONAL]

@@ -13,7 +13,7 @@ from qgis.core import (
 )
 
 from ...core.design_numbers import number_in
-from ...core.jobs.declaration import Parameter
+from ...core.jobs.declaration import Number, Parameter
 from .parameter_values import ParameterValues
 
 
@@ -32,9 +32,9 @@ def check_values(definitions: Sequence[QgsProcessingParameterDefinition], values
         A number is NaN, EXTENT has no area, RAIL_CLASSES is not a list of classes, or ENGINE cannot run on DEVICE.
     """
     names = {definition.name() for definition in definitions}
-    for definition in definitions:
-        if isinstance(definition, QgsProcessingParameterNumber):
-            values.optional_number(definition.name())
+    for one in values.job.parameters:
+        if isinstance(one, Number):
+            values[one.name]
     if "EXTENT" in names:
         values.extent(None)
     if "RAIL_CLASSES" in names:

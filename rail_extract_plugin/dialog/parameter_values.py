@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import AbstractContextManager
 from dataclasses import replace
 from pathlib import Path
@@ -14,7 +14,6 @@ from qgis.core import (
     QgsCoordinateReferenceSystem,
     QgsProcessingAlgorithm,
     QgsProcessingContext,
-    QgsProcessingFeatureSource,
     QgsProcessingOutputLayerDefinition,
     QgsProperty,
     QgsWkbTypes,
@@ -25,8 +24,8 @@ from ...core.errors import ParameterError, RailExtractError, RasterError
 from ...core.jobs import declaration as kinds
 from ...core.jobs.clouds import Bounds, CloudSource, checked_crs
 from ...core.jobs.declaration import Job
-from ...core.jobs.shared import DECREASING
-from ...core.jobs.values import Rows, Values
+from ...core.jobs.values import Values
+from ...core.progress import SILENT
 from ..reading.clouds import cloud_source, points_folder
 from ..setup.interpreter import known_interpreter
 from ..systems import prepare_system, system
@@ -35,13 +34,9 @@ from .passwords import masked
 if TYPE_CHECKING:
     import numpy as np
 
-    from ...core.airborne.survey import Guide
-    from ...core.alignment.placed_axes import PlacedAxes
-    from ...core.clouds.mask import Mask
-    from ...core.jobs.lines import Lines
-    from ...core.output.raster_file import RasterHeader
-    from ...core.progress import Progress
+    from ...core.files.rail_rasters import RasterSource
     from ...core.run.loop import Runner
+    from ..reading.layers import LayerSource
 
 TYPES_WITHOUT_LINES = (
     QgsWkbTypes.GeometryType.PointGeometry,
@@ -72,16 +67,17 @@ class ParameterValues(Values):
     ) -> None:
         self.algorithm, self.parameters, self.context = algorithm, parameters, context
         self.job: Job = algorithm.JOB
-        self._opened: dict[str, Any] = {}
+        self._read: dict[str, Any] = {}
         self._command = ""
 
     def __getitem__(self, name: str) -> Any:
         """Return the value of a parameter, by its kind; None if it is empty, and the WKT of a coordinate system."""
         one = next(one for one in self.job.parameters if one.name == name)
-        if isinstance(one, kinds.Number):
-            number = self.optional_number(name) if one.optional else self.number(name)
-            return int(number) if one.whole and number is not None else number
         return READERS[type(one)](self, one)
+
+    def read_as(self, kind: str, name: str) -> Any:
+        """Return a value as QGIS reads it for a kind of parameters."""
+        return getattr(self.algorithm, f"parameterAs{kind}")(self.parameters, name, self.context)
 
     @property
     def command(self) -> str:
@@ -91,7 +87,7 @@ class ParameterValues(Values):
 
     def follow(self, prepared: ParameterValues) -> None:
         """Take over what was read in the main thread."""
-        self._opened, self._command = prepared._opened, prepared.command
+        self._read, self._command = prepared._read, prepared.command
 
     def open_sources(self) -> None:
         """Find the clouds and open the layers, in the main thread.
@@ -105,12 +101,11 @@ class ParameterValues(Values):
             if isinstance(one, kinds.Cloud) and self.filled(one.name):
                 self.cloud(one.name)
             elif isinstance(one, kinds.LayerInput) and not one.transformed and self.filled(one.name):
-                read = self._lines_source if one.kinds == (kinds.LINE,) else self.table
-                self._opened[one.name] = read(one.name)
+                self.source(one.name)
 
     def title(self, name: str) -> str:
         """Return the name of the layer that was given for an input, to show to users; empty without one."""
-        return self._opened[name].sourceName() if name in self._opened else ""
+        return self._read[name].source.sourceName() if name in self._read else ""
 
     def prepare(self, crs_wkt: str | None) -> None:
         """Build the coordinate system of the results in this thread, which is the main one."""
@@ -124,67 +119,15 @@ class ParameterValues(Values):
         """Return the file of an output that is wanted."""
         return self.algorithm.destinations.get(name) or Destination.at(self.path(name))
 
-    def system(self, name: str) -> str | None:
-        """Return the coordinate system of a layer as WKT; None if it has none."""
-        from ..reading.line_layers import wkt_of
-
-        return wkt_of(self._opened[name].sourceCrs()) or None
-
-    def rows(self, name: str, progress: Progress) -> Rows:
-        """Read the fields of a layer."""
-        from ..reading.line_layers import rows_of
-
-        return rows_of(self._opened[name], progress)
-
-    def lines(self, name: str, progress: Progress) -> Lines:
-        """Read the lines of a layer."""
-        from ..reading.line_layers import read_lines
-
-        return read_lines(self._opened[name], progress, name)
-
-    def number(self, name: str) -> float:
-        """Read a number.
-
-        Raises
-        ------
-        ParameterError
-            The value is NaN, which QGIS accepts.
-        """
-        number = self.algorithm.parameterAsDouble(self.parameters, name, self.context)
-        if math.isnan(number):
-            raise ParameterError(f"{name} can't be nan: give a number.")
-        return number
-
-    def optional_number(self, name: str) -> float | None:
-        """Read a number that may be left empty."""
-        return self.number(name) if self.filled(name) else None
-
     def runner(self) -> AbstractContextManager[Runner]:
         """Provide the runner with as many processes as WORKERS asks for."""
         from ...core.run.processes import workers
 
-        return workers(int(self.number("WORKERS")), known_interpreter)
-
-    def flag(self, name: str) -> bool:
-        """Read a choice of yes or no."""
-        return self.algorithm.parameterAsBoolean(self.parameters, name, self.context)
-
-    def text(self, name: str) -> str:
-        """Read a text."""
-        return self.algorithm.parameterAsString(self.parameters, name, self.context)
-
-    def choice(self, name: str) -> str:
-        """Read the static string of an enum."""
-        return self.algorithm.parameterAsEnumString(self.parameters, name, self.context)
+        return workers(self["WORKERS"], known_interpreter)
 
     def filled(self, name: str) -> bool:
         """Return whether a value was entered."""
         return self.parameters.get(name) not in (None, "", NULL)
-
-    def file(self, name: str) -> Path | None:
-        """Read a file that may be left empty."""
-        given = self.algorithm.parameterAsFile(self.parameters, name, self.context)
-        return Path(given) if given else None
 
     def wanted(self, name: str) -> bool:
         """Return whether an output is to be written; the batch dialog gives an empty definition for a skipped one."""
@@ -192,156 +135,73 @@ class ParameterValues(Values):
 
     def output_file(self, name: str) -> str:
         """Return the file of an output; QGIS chooses the name of a temporary one during the run."""
-        return self.algorithm.parameterAsFileOutput(self.parameters, name, self.context)
+        return self.read_as("FileOutput", name)
 
-    def raster(self, name: str) -> tuple[Path, RasterHeader]:
-        """Return the file of a raster and its header.
+    def raster(self, name: str) -> RasterSource:
+        """Return a rail raster, whose header is read in the main thread."""
+        return self.once(name, lambda: self._raster(name))
 
-        Raises
-        ------
-        RasterError
-            The value is not a rail raster in a file.
-        """
-        from ..reading.geotiff import read_header
+    def _raster(self, name: str) -> RasterSource:
+        from ...core.files.rail_rasters import RasterSource
+        from ..reading.rasters import open_with_gdal
 
-        layer = self.algorithm.parameterAsRasterLayer(self.parameters, name, self.context)
+        layer = self.read_as("RasterLayer", name)
         if layer is None:
             raise RasterError(f"{name} is not a readable raster: give the output of Rasterize Rail Points.")
-        path = Path(layer.source())
-        header = read_header(path)
-        prepare_system(header.frame.crs_wkt)
-        return path, header
-
-    def _lines_source(self, name: str) -> QgsProcessingFeatureSource:
-        """Return a line layer.
-
-        Raises
-        ------
-        RailExtractError
-            There is no such layer, it is not a line layer, or it is in degrees.
-        """
-        from ..reading.line_layers import check_system, wkt_of
-
-        source = self._line_source(name)
-        check_system(source.sourceCrs())
-        prepare_system(wkt_of(source.sourceCrs()))
+        source = RasterSource(Path(layer.source()), open_with_gdal)
+        prepare_system(source.header.frame.crs_wkt)
         return source
 
-    def axes(self, crs_wkt: str | None) -> PlacedAxes:
-        """Read AXIS and what states its kilometres, in a coordinate system."""
-        return self._once("AXIS", lambda: self._axes(system(crs_wkt)))
-
-    def _axes(self, crs: QgsCoordinateReferenceSystem) -> PlacedAxes:
-        """Read AXIS and what states its kilometres, in a coordinate system.
+    def source(self, name: str) -> LayerSource:
+        """Return a vector layer or a table.
 
         Raises
         ------
         RailExtractError
-            They can't be transformed, state no kilometres or contradict each other.
+            It can't be read, has no lines where only these are of use, or has them in degrees where they are measured.
         """
-        from ...core.alignment.stations import Start
-        from ..reading.axes import AxisSources, read_axes
+        return self.once(name, lambda: self._source(name))
 
-        start_km = self.optional_number("START_KM")
-        start = None if start_km is None else Start(start_km, self.choice("DIRECTION") == DECREASING)
-        posts, jumps = (self.table(name) if self.filled(name) else None for name in ("POSTS", "JUMPS"))
-        sources = AxisSources(self._line_source("AXIS"), start, posts, self.text("POST_FIELD"), jumps)
-        return read_axes(sources, crs, self.choice("FORMAT"), self.context)
+    def _source(self, name: str) -> LayerSource:
+        from ...core.jobs.lines import system_of
+        from ..reading.layers import LayerSource
 
-    def axis_crs(self) -> QgsCoordinateReferenceSystem:
-        """Return the coordinate system of AXIS."""
-        return self._line_source("AXIS").sourceCrs()
-
-    def table(self, name: str) -> QgsProcessingFeatureSource:
-        """Return a layer or a table."""
-        source = self.algorithm.parameterAsSource(self.parameters, name, self.context)
-        if source is None:
+        layers = (one for one in self.job.parameters if isinstance(one, kinds.LayerInput))
+        one = next(one for one in layers if one.name == name)
+        has_lines = one.kinds == (kinds.LINE,)
+        layer = self.read_as("Source", name)
+        if layer is None:
             raise RailExtractError(f"{name} is not a readable layer: choose another one.")
-        return source
-
-    def _mask(self, cloud: CloudSource) -> Mask | None:
-        """Read the polygons of MASK, in the coordinate system of the cloud.
-
-        Raises
-        ------
-        RailExtractError
-            The layer has no polygons, or they can't be transformed.
-        """
-        if not self.filled("MASK"):
-            return None
-        from ..reading.line_layers import read_mask
-
-        source = self.algorithm.parameterAsSource(self.parameters, "MASK", self.context)
-        if source is None:
-            raise RailExtractError("MASK is not a readable layer: give a polygon layer.")
-        return read_mask(source, system(checked_crs(cloud)), self.context)
-
-    def _left_out(self) -> tuple[str, ...]:
-        """Read LEAVE_OUT; nothing where an algorithm does not have it."""
-        return self["LEAVE_OUT"] if self.has("LEAVE_OUT") else ()
-
-    def _line_source(self, name: str) -> QgsProcessingFeatureSource:
-        """Return a layer that may have lines."""
-        source = self.algorithm.parameterAsSource(self.parameters, name, self.context)
-        if source is None:
-            raise RailExtractError(f"{name} is not a readable layer: give a line layer.")
-        kind = source.wkbType()
-        if QgsWkbTypes.geometryType(kind) in TYPES_WITHOUT_LINES:
-            raise RailExtractError(
-                f"{name} has the geometry type {QgsWkbTypes.displayString(kind)}: give a line layer."
-            )
+        if has_lines:
+            _check_lines(name, layer.wkbType())
+        source = LayerSource(name, layer, self.context)
+        if has_lines and not one.transformed:
+            system_of(source.crs_wkt, SILENT)
+            prepare_system(source.crs_wkt)
         return source
 
     def cloud(self, name: str = "INPUT") -> CloudSource:
         """Return the files of a cloud; the parameter CRS, if any, applies to files that state no coordinate system."""
-        if name not in self._opened:
-            source = cloud_source(self.parameters.get(name), self.context)
-            crs = self.projected_crs()
-            source = replace(source, crs_wkt=crs.toWkt()) if crs.isValid() else source
-            prepare_system(checked_crs(source))
-            self._opened[name] = replace(source, mask=self._mask(source), leave_out=self._left_out())
-        return self._opened[name]
+        return self.once(f"cloud {name}", lambda: self._cloud(name))
+
+    def _cloud(self, name: str) -> CloudSource:
+        source = cloud_source(self.parameters.get(name), self.context)
+        crs = self.projected_crs()
+        source = replace(source, crs_wkt=crs.toWkt()) if crs.isValid() else source
+        prepare_system(checked_crs(source))
+        return self.with_mask(source)
 
     def scratch(self) -> AbstractContextManager[Path]:
         """Provide a folder for the points of a run."""
         return points_folder()
 
-    def lines_along(self, name: str, crs_wkt: str | None) -> Sequence[np.ndarray]:
-        """Read lines that show places along tracks, (k, 2) each, in a coordinate system."""
-        from ..reading.line_layers import read_guide
+    def picked(self, crs_wkt: str | None) -> list[np.ndarray]:
+        """Return the place of SEED in a coordinate system, (1, 2)."""
+        from ..reading.layers import read_place
 
-        return self._once(name, lambda: read_guide(self._line_source(name), system(crs_wkt), self.context))
-
-    def guides(self, name: str, crs_wkt: str | None) -> Sequence[Guide]:
-        """Read such lines with what they state of their tracks."""
-        from ..reading.line_layers import read_tracks_meant
-
-        return self._once(name, lambda: read_tracks_meant(self._line_source(name), system(crs_wkt), self.context))
-
-    def seeds(self, crs_wkt: str | None) -> Sequence[np.ndarray]:
-        """Read SEEDS and SEED in a coordinate system: points, (1, 2), and lines, (k, 2)."""
-        return self._once("SEEDS", lambda: self._seeds(system(crs_wkt)))
-
-    def _seeds(self, crs: QgsCoordinateReferenceSystem) -> list[np.ndarray]:
-        from ..reading.line_layers import read_place, read_seeds
-
-        found: list[np.ndarray] = []
-        if self.filled("SEEDS"):
-            source = self.algorithm.parameterAsSource(self.parameters, "SEEDS", self.context)
-            if source is None:
-                raise RailExtractError("SEEDS is not a readable layer: give a layer of points or lines.")
-            found += read_seeds(source, crs, self.context)
-        if self.filled("SEED"):
-            place = self.algorithm.parameterAsPoint(self.parameters, "SEED", self.context)
-            own = self.algorithm.parameterAsPointCrs(self.parameters, "SEED", self.context)
-            found.append(read_place(place, own, crs, self.context))
-        return found
-
-    def _once(self, name: str, read: Callable[[], Any]) -> Any:
-        """Return what was read in the main thread."""
-        if name not in self._opened:
-            self._opened[name] = read()
-        return self._opened[name]
+        place = self.read_as("Point", "SEED")
+        own = self.read_as("PointCrs", "SEED")
+        return [read_place(place, own, system(crs_wkt), self.context)]
 
     def projected_crs(self) -> QgsCoordinateReferenceSystem:
         """Return the coordinate system CRS, an invalid one if it is empty.
@@ -351,7 +211,7 @@ class ParameterValues(Values):
         ParameterError
             It is not a coordinate system, or it is in degrees.
         """
-        crs = self.algorithm.parameterAsCrs(self.parameters, "CRS", self.context)
+        crs = self.read_as("Crs", "CRS")
         if self.filled("CRS") and not crs.isValid():
             raise ParameterError(f"CRS {self.parameters['CRS']} is not a coordinate system: choose one from the list.")
         if crs.isGeographic():
@@ -387,26 +247,47 @@ def destination_text(value: Any, context: QgsProcessingContext) -> str:
     return value or ""
 
 
+def _check_lines(name: str, kind: QgsWkbTypes.Type) -> None:
+    """Refuse a layer whose type of geometry has no lines."""
+    if QgsWkbTypes.geometryType(kind) in TYPES_WITHOUT_LINES:
+        raise RailExtractError(f"{name} has the geometry type {QgsWkbTypes.displayString(kind)}: give a line layer.")
+
+
+def _number(values: ParameterValues, one: kinds.Number) -> float | None:
+    """Read a number that is not NaN, which QGIS accepts."""
+    if one.optional and not values.filled(one.name):
+        return None
+    number = values.read_as("Double", one.name)
+    if math.isnan(number):
+        raise ParameterError(f"{one.name} can't be nan: give a number.")
+    return int(number) if one.whole else number
+
+
 def _chosen(values: ParameterValues, one: kinds.Choice) -> Any:
     """Read a choice: one id, several, or the place of one."""
-    algorithm, given = values.algorithm, (values.parameters, one.name, values.context)
-    if one.numbered:
-        return algorithm.parameterAsEnum(*given)
-    return tuple(algorithm.parameterAsEnumStrings(*given)) if one.several else values.choice(one.name)
+    if one.several:
+        return tuple(values.read_as("EnumStrings", one.name))
+    return values.read_as("Enum" if one.numbered else "EnumString", one.name)
+
+
+def _file(values: ParameterValues, one: kinds.FileInput) -> Path | None:
+    given = values.read_as("File", one.name)
+    return Path(given) if given else None
 
 
 def _system(values: ParameterValues, one: kinds.System) -> str | None:
-    from ..reading.line_layers import wkt_of
+    from ..reading.layers import wkt_of
 
     return wkt_of(values.projected_crs()) or None
 
 
 READERS: dict[type, Callable[[ParameterValues, Any], Any]] = {
-    kinds.Flag: lambda values, one: values.flag(one.name),
+    kinds.Number: _number,
+    kinds.Flag: lambda values, one: values.read_as("Boolean", one.name),
     kinds.Choice: _chosen,
-    kinds.Text: lambda values, one: values.text(one.name),
-    kinds.FieldInput: lambda values, one: values.text(one.name),
-    kinds.FileInput: lambda values, one: values.file(one.name),
+    kinds.Text: lambda values, one: values.read_as("String", one.name),
+    kinds.FieldInput: lambda values, one: values.read_as("String", one.name),
+    kinds.FileInput: _file,
     kinds.System: _system,
 }
 """Functions that read a value, by the kind of the parameter."""

@@ -1,58 +1,75 @@
-"""Model and position of rail rasters from files."""
+"""Rasters that GDAL reads, for the checks of `core.files.rail_rasters`."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
 
-from ...core.errors import RasterError
-from ...core.frame import LocalFrame
-from ...core.frpdf.models import MODELS, Model, choose
-from ...core.output.raster_file import RasterHeader
-from ...core.raster import RailRaster, cell_size
-from ...core.standards import RailStandard
+import numpy as np
+from osgeo import gdal
 
-CELL_TOLERANCE = 0.03
-"""Relative deviation allowed from the cell size that the network expects; its training covered such a deviation."""
+from ...core.files.rail_rasters import Block, RasterFile
+from ...core.files.raster_file import BLOCK
 
 
-def choose_model(header: RasterHeader, standard: RailStandard, name: str) -> Model:
-    """Find the model that the user named, or that the raster names, or that fits the rails; check the cell size.
-
-    Parameters
-    ----------
-    header : RasterHeader
-    standard : RailStandard
-        The raster's rails.
-    name : str
-        Name of a model, or AUTO.
-
-    Raises
-    ------
-    ModelError
-        No model fits.
-    RasterError
-        The cells do not have the size that the network expects for these rails.
-    """
-    expected_m = cell_size(standard.gauge_m, standard.head_width_m)
-    if not math.isclose(header.cell_m, expected_m, rel_tol=CELL_TOLERANCE):
-        raise RasterError(
-            f"The raster's cells are {1000 * header.cell_m:.1f} mm wide, but a gauge of {1000 * standard.gauge_m:.0f} "
-            f"mm with a railhead of {1000 * standard.head_width_m:.1f} mm needs {1000 * expected_m:.1f} mm: rasterize "
-            "the points for these rails, or correct GAUGE and HEAD_WIDTH."
-        )
-    named = {model.name: model for model in MODELS}
-    return named.get(name) or named.get(header.model or "") or choose(standard.gauge_m, standard.head_width_m)
+@contextmanager
+def open_with_gdal(path: Path) -> Iterator[RasterFile]:
+    """Open a raster; newer versions of GDAL raise errors for a damaged file, as QGIS or another plugin may enable."""
+    try:
+        dataset = gdal.OpenEx(str(path), gdal.OF_RASTER | gdal.OF_READONLY)
+        if dataset is None or dataset.RasterCount == 0:
+            raise OSError(gdal.GetLastErrorMsg())
+        yield _GdalFile(dataset)
+    except RuntimeError as error:
+        raise OSError(str(error)) from error
 
 
-def moved(raster: RailRaster, frame: LocalFrame, other: LocalFrame) -> RailRaster:
-    """Return a raster in another local frame of the same coordinate system.
+class _GdalFile(RasterFile):
+    """A raster that GDAL has opened."""
 
-    Parameters
-    ----------
-    raster : RailRaster
-    frame, other : LocalFrame
-        Present frame and new frame.
-    """
-    right, up, _ = frame.shift_to(other)
-    return replace(raster, x0=raster.x0 + float(right), y0=raster.y0 + float(up))
+    def __init__(self, dataset: gdal.Dataset) -> None:
+        self._dataset = dataset
+        self.transform, self.crs_wkt = dataset.GetGeoTransform(), dataset.GetProjection() or None
+        self.shape, self.tags = (dataset.RasterYSize, dataset.RasterXSize), dataset.GetMetadata()
+        self.bands = tuple(dataset.GetRasterBand(one).GetDescription() for one in range(1, dataset.RasterCount + 1))
+
+    def filled_blocks(self, number: int) -> list[Block]:
+        """Return the blocks of a band that the file stores."""
+        return list(_filled(self._dataset.GetRasterBand(number), 0, 0, *self.shape))
+
+    def read(self, number: int, block: Block) -> np.ndarray:
+        """Return which cells of a block are rail."""
+        row, column, height, width = block
+        band = self._dataset.GetRasterBand(number)
+        is_rail = np.ones((height, width), dtype=bool)
+        for cells in (band, band.GetMaskBand()):  # the mask is 0 at nodata
+            try:
+                data = cells.ReadRaster(column, row, width, height, buf_type=gdal.GDT_Byte)
+            except RuntimeError:
+                data = None
+            if data is None:
+                raise OSError(gdal.GetLastErrorMsg())
+            is_rail &= np.frombuffer(data, dtype=np.uint8).reshape(height, width) != 0
+        return is_rail
+
+
+def _filled(band: gdal.Band, row: int, column: int, height: int, width: int) -> Iterator[Block]:
+    status, _ = band.GetDataCoverageStatus(column, row, width, height, gdal.GDAL_DATA_COVERAGE_STATUS_DATA)
+    if not status & gdal.GDAL_DATA_COVERAGE_STATUS_DATA:
+        return
+    if height <= BLOCK and width <= BLOCK:
+        yield row, column, height, width
+        return
+    for top, rows in _halves(row, height):
+        for left, columns in _halves(column, width):
+            yield from _filled(band, top, left, rows, columns)
+
+
+def _halves(start: int, length: int) -> tuple[tuple[int, int], ...]:
+    """Split a range of cells at a block border near its middle."""
+    if length <= BLOCK:
+        return ((start, length),)
+    first = BLOCK * math.ceil(length / BLOCK / 2)
+    return (start, first), (start + first, length - first)

@@ -60,7 +60,8 @@ class Review:
     def figures(self) -> str:
         """Length in doubt, and the figures at the worst place."""
         written = {"doubt_m": "{:,.1f} m in doubt", "gauge_mm": "gauge {:.1f} mm", "cant_mm": "cant {:.1f} mm"}
-        written |= {"sigma_mm": "standard error {:.1f} mm", "points": "{:,} points"}
+        written |= {"sigma_mm": "standard error {:.1f} mm across", "sigmaz_mm": "{:.1f} mm in height"}
+        written |= {"points": "{:,} points"}
         known = {name: self.value(name) for name in written}
         return ", ".join(written[name].format(known[name]) for name in written if known[name] is not None)
 

@@ -14,7 +14,7 @@ from ...core.errors import Cancelled, RailExtractError
 from ...core.jobs.lines import gaps_in
 from ...core.polyline import Polyline
 from ..feedback import TaskProgress
-from ..reading.line_layers import row_of
+from ..reading.layers import Row
 from ..writing.layers import vertices_of
 from ..writing.run import RUN, RunCloud, cloud_of
 from .findings import Review
@@ -228,4 +228,4 @@ def _rails_of_run(run: str | None, units_m: np.ndarray) -> list[Rail]:
     ]
     features = [feature for layer in mine for feature in layer.getFeatures() if feature.hasGeometry()]
     lines = [vertices_of(feature) * units_m for feature in features]
-    return [Rail(line, gaps_in(row_of(feature), line)) for feature, line in zip(features, lines)]
+    return [Rail(line, gaps_in(Row(feature), line)) for feature, line in zip(features, lines)]

@@ -88,8 +88,6 @@ def _in_other_dialogs(dialog: RunDialog, layers: dict[str, QgsVectorLayer], resu
     if "ELEMENTS" in layers and "FIXED" in dialog.mainWidget().wrappers:
         values = {"INPUT": layers["ELEMENTS"].id()}
         yield Step("Export the elements for design software…", lambda: dialog.go_on("exportalignment", values))
-    if "PROPOSED" in layers and layers["PROPOSED"].featureCount():
-        yield Step("Run again with the proposed guides", _again(dialog, GUIDE=layers["PROPOSED"].id()))
     if "RAIL_POINTS" in results and results.get("OUTPUT"):
         given = dialog.mainWidget().createProcessingParameters()
         values = {"INPUT": dialog.cloud_layer(results["OUTPUT"]), "RAIL_CLASSES": str(given["RAIL_CLASS"])}

@@ -111,6 +111,12 @@ class Pip:
     def resolve(self, order: Order, locked: Mapping[str, Locked], progress: Progress) -> list[Locked]:
         """Return the files that an order would add: those that are locked, otherwise those that the index names."""
         report, constraints = self._temporary / "report.json", self._temporary / "constraints.txt"
+        if order.options:
+            locked = {}
+            progress.info(
+                f"The files of {', '.join(order.requirements)} come from an index of their own, {order.options[-1]}: "
+                "they are compared with its checksums, because this plugin has none of them."
+            )
         versions = [package.requirement for name, package in locked.items() if _version_in_qgis(name) is None]
         constraints.write_text("\n".join([*pins(), *versions]), encoding="utf-8")
         options = ["--dry-run", "--report", str(report), "--constraint", str(constraints), *order.options]

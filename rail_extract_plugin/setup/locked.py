@@ -10,15 +10,8 @@ from pathlib import Path
 
 LIST = Path(__file__).with_name("locked.txt")
 
-SYSTEMS = (
-    ("win32", "amd64"),
-    ("linux", "x86_64"),
-    ("linux", "aarch64"),
-    ("darwin", "x86_64"),
-    ("darwin", "arm64"),
-)
+SYSTEMS = ("win32-amd64", "linux-x86_64", "linux-aarch64", "darwin-x86_64", "darwin-arm64")
 """Systems and processors of which the list has the files."""
-
 
 BROUGHT = {
     "laspy[lazrs]": ("laspy", "lazrs"),
@@ -49,10 +42,9 @@ class Locked:
 
 def locked_packages() -> dict[str, Locked]:
     """Return the packages of the list for this Python, by name; none on a system of which the list has no files."""
-    if (sys.platform, platform.machine().lower()) not in SYSTEMS:
-        return {}
-    python = "{}.{}".format(*sys.version_info)
-    return {locked.name: locked for locked, pythons in _listed() if python in pythons}
+    system, python = f"{sys.platform}-{platform.machine().lower()}", "{}.{}".format(*sys.version_info)
+    here = {python, f"{python}:{system}"} if system in SYSTEMS else set()
+    return {locked.name: locked for locked, places in _listed() if here.intersection(places)}
 
 
 def locked_order(requirements: Sequence[str], locked: Mapping[str, Locked]) -> list[Locked] | None:
@@ -71,9 +63,9 @@ def locked_order(requirements: Sequence[str], locked: Mapping[str, Locked]) -> l
 
 
 def _listed() -> Iterator[tuple[Locked, list[str]]]:
-    """Yield each version in the list, and the Pythons it is for."""
+    """Yield each version in the list, and the Pythons it is for, each on all systems or, after a colon, on one."""
     for line in LIST.read_text(encoding="ascii").splitlines():
         if not line.startswith("#"):
-            requirement, pythons, *checksums = line.split()
+            requirement, places, *checksums = line.split()
             name, version = requirement.split("==")
-            yield Locked(name, version, tuple(checksums)), pythons.split(",")
+            yield Locked(name, version, tuple(checksums)), places.split(",")

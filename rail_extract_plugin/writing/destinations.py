@@ -36,7 +36,7 @@ PAGES = ("", ".html", ".htm")
 """Suffixes of reports."""
 
 EXCHANGED = (".dxf", ".csv")
-"""Suffixes of files for other programs, which QGIS's sinks do not write; see `core.output.exchange`."""
+"""Suffixes of files for other programs, which QGIS's sinks do not write; see `core.files.exchange`."""
 
 RESERVED = "gpkg"
 """No table of a GeoPackage that holds data may begin with it."""

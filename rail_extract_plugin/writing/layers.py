@@ -15,12 +15,14 @@ from qgis.core import (
     QgsCoordinateReferenceSystem,
     QgsFeature,
     QgsFeatureSink,
+    QgsField,
     QgsFields,
     QgsGeometry,
     QgsLineString,
     QgsPoint,
     QgsProcessingContext,
     QgsProcessingOutputLayerDefinition,
+    QgsProcessingUtils,
     QgsVertexIterator,
     QgsWkbTypes,
 )
@@ -28,7 +30,7 @@ from qgis.core import (
 from ...core.disk import Destination
 from ...core.errors import RailExtractError
 from ...core.fields import PLACES, UNKNOWN_IN_METRES, Field, Product
-from ...core.progress import SILENT, Progress
+from ...core.progress import Progress
 from ..compat import INTEGER, REAL, TEXT, field
 from ..dialog.parameter_values import ParameterValues
 from ..systems import lost_part, system
@@ -39,9 +41,9 @@ from .whole_files import write_whole
 if TYPE_CHECKING:
     import numpy as np
 
+    from ...core.files.layers import AnyLayer, Copy, Layer
+    from ...core.files.raster_file import RasterHeader
     from ...core.frame import LocalFrame
-    from ...core.output.layers import Layer
-    from ...core.output.raster_file import RasterHeader
     from ...core.raster import RailRaster
 
 KINDS = {int: INTEGER, float: REAL, str: TEXT}
@@ -94,16 +96,16 @@ def _shape_of(layer: Layer) -> QgsWkbTypes.Type:
     return types.LineString if flat else types.LineStringZ
 
 
-def copies(originals: Sequence[QgsFeature], columns: QgsFields, rows: Sequence[Sequence[Any]]) -> Iterator[QgsFeature]:
-    """Copy features with further values, (n, k), for the last fields of `columns`; objects become texts."""
-    for original, row in zip(originals, rows):
+def _copies(layer: Copy, columns: QgsFields) -> Iterator[QgsFeature]:
+    """Copy features with values for the last fields of `columns`; objects become texts."""
+    for original, row in zip(layer.originals.stored(), zip(*layer.written_columns())):
         feature = QgsFeature(columns)
         feature.setGeometry(original.geometry())
         own = [
             json.dumps(value, ensure_ascii=False) if isinstance(value, dict) else value
             for value in original.attributes()
         ]
-        feature.setAttributes([*own, *row[: columns.count() - len(own)]])
+        feature.setAttributes([*own, *row])
         yield feature
 
 
@@ -124,7 +126,7 @@ def add_features(sink: QgsFeatureSink, made: Iterator[QgsFeature]) -> int:
     return count
 
 
-def write_layer(values: ParameterValues, name: str, layer: Layer, frame: LocalFrame) -> dict[str, str]:
+def write_layer(values: ParameterValues, name: str, layer: AnyLayer, frame: LocalFrame) -> dict[str, str]:
     """Write a layer to an output.
 
     Parameters
@@ -132,7 +134,7 @@ def write_layer(values: ParameterValues, name: str, layer: Layer, frame: LocalFr
     values : ParameterValues
     name : str
         Name of the output.
-    layer : Layer
+    layer : Layer or Copy
     frame : LocalFrame
         Local frame of the layer.
 
@@ -146,8 +148,12 @@ def write_layer(values: ParameterValues, name: str, layer: Layer, frame: LocalFr
     RailExtractError
         The output cannot be written.
     """
+    from ...core.files.layers import Copy
+
     if not values.wanted(name):
         return {}
+    if isinstance(layer, Copy):
+        return _write_copy(values, name, layer)
     shape, made, product = _shape_of(layer), features(layer, frame), layer.product
     destination = values.algorithm.destinations.get(name)
     if destination is not None and destination.file.suffix.lower() in EXCHANGED:
@@ -159,7 +165,7 @@ def write_layer(values: ParameterValues, name: str, layer: Layer, frame: LocalFr
 
 
 def layer_writers(
-    values: ParameterValues, makers: Mapping[str, Callable[[], Layer]], frame: LocalFrame
+    values: ParameterValues, makers: Mapping[str, Callable[[], AnyLayer]], frame: LocalFrame
 ) -> dict[str, Callable[[], dict[str, str]]]:
     """Return the functions that make layers and write them to the outputs of their names, for `write_each`.
 
@@ -177,7 +183,7 @@ def layer_writers(
 
 
 def write_raster(
-    values: ParameterValues, name: str, header: RasterHeader, rasters: Sequence[RailRaster], progress: Progress = SILENT
+    values: ParameterValues, name: str, header: RasterHeader, rasters: Sequence[RailRaster], progress: Progress
 ) -> dict[str, str]:
     """Write rail rasters, one per class, to an output.
 
@@ -194,7 +200,7 @@ def write_raster(
     dict of str to str
         The path of the file by the name of the output; empty if the user skipped it.
     """
-    from ..reading.geotiff import write_rasters
+    from .geotiff import write_rasters
 
     if not values.wanted(name):
         return {}
@@ -211,38 +217,27 @@ def output_crs(wkt: str | None) -> QgsCoordinateReferenceSystem:
     return system(wkt or UNKNOWN_IN_METRES)
 
 
-def write_copy(
-    values: ParameterValues,
-    name: str,
-    columns: QgsFields,
-    shape: QgsWkbTypes.Type,
-    made: Iterator[QgsFeature],
-    crs: QgsCoordinateReferenceSystem,
-) -> dict[str, str]:
-    """Write a copy of a layer of any kind, with other fields.
+def _write_copy(values: ParameterValues, name: str, layer: Copy) -> dict[str, str]:
+    """Write a copy of a layer of any kind, with further fields; objects, which few formats hold, become texts."""
+    from ..reading.layers import MIXED
 
-    Parameters
-    ----------
-    values, name
-        See `write_layer`.
-    columns : QgsFields
-    shape : QgsWkbTypes.Type
-    made : iterator of QgsFeature
-    crs : QgsCoordinateReferenceSystem
-    """
+    source, kept = layer.originals.source, QgsFields()
+    for one in source.fields():
+        kept.append(QgsField(one.name(), TEXT) if one.typeName() == MIXED else one)
+    columns = QgsProcessingUtils.combineFields(kept, fields(layer.fields))
+    shape, crs, made = source.wkbType(), source.sourceCrs(), _copies(layer, columns)
     destination, wkt = values.algorithm.destinations.get(name), crs.toWkt() if crs.isValid() else None
     if destination is None or destination.file.suffix.lower() not in EXCHANGED:
         return _layer(values, name, PLACES.style, columns, shape, made, crs, wkt)
     import numpy as np
 
-    from ...core.clouds.crs import parse_crs, units
+    from ...core.clouds.crs import unit_in_plan
     from ...core.frame import LocalFrame
 
     if QgsWkbTypes.geometryType(shape) == QgsWkbTypes.GeometryType.PolygonGeometry:
         raise RailExtractError(f"{name} can't be {destination.path.name} for polygons: choose a GeoPackage.")
     written = tuple(Field(one.name(), float if one.isNumeric() else str, "") for one in columns)
-    unit_m = units(parse_crs(wkt))[0] if wkt and not crs.isGeographic() else 1.0
-    frame = LocalFrame(np.zeros(3), unit_m, crs_wkt=wkt)
+    frame = LocalFrame(np.zeros(3), unit_in_plan(wkt), crs_wkt=wkt)
     return _exchange(values, name, replace(PLACES, fields=written), shape, made, frame)
 
 
@@ -279,7 +274,7 @@ def _exchange(
     frame: LocalFrame,
 ) -> dict[str, str]:
     """Write features for other programs; QGIS loads the file if the user wants that."""
-    from ...core.output.exchange import Shape, write_shapes
+    from ...core.files.exchange import Shape, write_shapes
 
     destination, value = values.algorithm.destinations[name], values.parameters.get(name)
     shapes = (

@@ -33,7 +33,7 @@ NO_PROPERTIES: Mapping[str, str] = {}
 
 TOP_TO_BOTTOM = (
     *("stops", "findings", "differences", "elements", "deviations", "axes", "centerlines", "airborne", "rails"),
-    *("proposed", "stations", "quality", "places", "raster"),
+    *("stations", "quality", "places", "raster"),
 )
 """Order of the layers of a run, by style: what is to be looked at first, then the lines, and what they rest on."""
 

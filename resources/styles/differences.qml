@@ -1,8 +1,9 @@
 <!DOCTYPE qgis PUBLIC 'http://mrcc.com/qgis.dtd' 'SYSTEM'>
 <qgis styleCategories="Symbology|Elevation|Fields|MapTips|AttributeTable" version="3.22.0">
-  <renderer-v2 type="categorizedSymbol" attr="CASE WHEN &quot;state&quot; &lt;&gt; 'both' THEN &quot;state&quot; WHEN &quot;moved&quot; = 1 THEN 'moved' ELSE 'still' END">
+  <renderer-v2 type="categorizedSymbol" attr="CASE WHEN &quot;state&quot; &lt;&gt; 'both' THEN &quot;state&quot; WHEN &quot;moved&quot; = 1 THEN 'moved' WHEN &quot;shifted&quot; = 1 THEN 'shifted' ELSE 'still' END">
     <categories>
       <category value="moved" symbol="0" label="moved by more than three standard errors" render="true"/>
+      <category value="shifted" symbol="4" label="shifted with all lines, not moved otherwise" render="true"/>
       <category value="still" symbol="1" label="not moved" render="true"/>
       <category value="missing" symbol="2" label="missing in the other survey" render="true"/>
       <category value="extra" symbol="3" label="not in the reference" render="true"/>
@@ -64,6 +65,20 @@
           </Option>
         </layer>
       </symbol>
+      <symbol name="4" type="marker" alpha="1">
+        <layer class="SimpleMarker" enabled="1" pass="0" locked="0">
+          <Option type="Map">
+            <Option name="name" type="QString" value="circle"/>
+            <Option name="color" type="QString" value="63,142,196,255"/>
+            <Option name="outline_color" type="QString" value="255,255,255,255"/>
+            <Option name="outline_style" type="QString" value="solid"/>
+            <Option name="outline_width" type="QString" value="0.2"/>
+            <Option name="outline_width_unit" type="QString" value="MM"/>
+            <Option name="size" type="QString" value="1.8"/>
+            <Option name="size_unit" type="QString" value="MM"/>
+          </Option>
+        </layer>
+      </symbol>
     </symbols>
   </renderer-v2>
   <aliases>
@@ -80,6 +95,7 @@
     <alias field="shift_mm" index="10" name="Constant shift across [mm]"/>
     <alias field="shiftz_mm" index="11" name="Constant shift in height [mm]"/>
     <alias field="moved" index="12" name="Moved"/>
+    <alias field="shifted" index="13" name="Shifted"/>
   </aliases>
   <attributetableconfig>
     <columns>
@@ -96,6 +112,7 @@
       <column type="field" name="shift_mm" width="250" hidden="0"/>
       <column type="field" name="shiftz_mm" width="280" hidden="0"/>
       <column type="field" name="moved" width="70" hidden="0"/>
+      <column type="field" name="shifted" width="80" hidden="0"/>
     </columns>
   </attributetableconfig>
   <mapTip>&lt;b&gt;Line [% &quot;line_id&quot; %], [% &quot;chainage_m&quot; %] m: [% &quot;state&quot; %]&lt;/b&gt;&lt;br&gt;across [% coalesce(&quot;across_mm&quot;, '?') %] mm, height [% coalesce(&quot;height_mm&quot;, '?') %] mm&lt;br&gt;standard errors [% coalesce(&quot;sigma_mm&quot;, '?') %] and [% coalesce(&quot;sigmaz_mm&quot;, '?') %] mm</mapTip>

@@ -33,7 +33,7 @@ def test_examples_give_what_they_show(name):
 
 def test_the_front_door_has_an_example():
     assert has_examples("rail_extract.core")
-    assert has_examples("rail_extract.core.front")
+    assert has_examples("rail_extract.core.commands.front")
 
 
 def test_every_package_is_distributed():

@@ -14,7 +14,11 @@ from typing import Any
 import laspy
 import numpy as np
 import pytest
+from rail_extract.laboratory.scenes.raw import scan_world
+from rail_extract.laboratory.scenes.raw_catalogue import BLUNT, STANDARD, line, parallel
 from rail_extract.laboratory.scenes.raw_strips import strip
+from rail_extract.laboratory.scenes.raw_world import ground, running_rails
+from rail_extract.laboratory.scenes.write import write_raw
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
@@ -75,7 +79,16 @@ def raw_cloud(tmp_path_factory):
 
 
 @pytest.fixture(scope="session")
-def run_scenario(tmp_path_factory, raw_cloud):
+def blunt_cloud(tmp_path_factory):
+    """A raw cloud of 24 m of track from blurred images, whose heads look wider than any."""
+    path = tmp_path_factory.mktemp("clouds") / "blunt.las"
+    track = parallel(line(24.0, 0.0, 0.35), (0.0,))
+    write_raw(scan_world("blunt", track, STANDARD, [BLUNT], [ground, running_rails], 1), path)
+    return path
+
+
+@pytest.fixture(scope="session")
+def run_scenario(tmp_path_factory, raw_cloud, blunt_cloud):
     """Run a scenario, once: tests share what it found. One that goes on has the profile of another one."""
     programs = {name: shutil.which(name) for name in ("qgis", "xvfb-run")}
     if not all(programs.values()) or "QGIS_PROCESS" not in os.environ:
@@ -95,6 +108,7 @@ def run_scenario(tmp_path_factory, raw_cloud):
             "TMPDIR": str(temporary),
             "RAIL_EXTRACT_SAMPLE": str(ROOT / "resources" / "sample" / "sample.laz"),
             "RAIL_EXTRACT_RAW": str(raw_cloud),
+            "RAIL_EXTRACT_BLUNT": str(blunt_cloud),
             "RAIL_EXTRACT_ZIP": str(ROOT / "build" / "rail_extract.zip"),
         }
         for name in ("QGIS_PLUGINPATH", "QGIS_CUSTOM_CONFIG_PATH"):

@@ -9,10 +9,12 @@ from collections.abc import Iterable, Iterator
 from functools import partial
 from pathlib import Path
 
+import processing
 from driver import Driver, algorithm, choose, close, install, later, open_batch, open_dialog, press_run, window
 from qgis.core import (
     QgsApplication,
     QgsCoordinateReferenceSystem,
+    QgsExpression,
     QgsLayerTree,
     QgsPointCloudLayer,
     QgsPointXY,
@@ -47,7 +49,7 @@ from qgis.PyQt.QtWidgets import (
 )
 from qgis.utils import iface, loadPlugin, plugins, reloadPlugin, startPlugin, unloadPlugin
 
-RAW, SAMPLE, ARCHIVE = (os.environ[f"RAIL_EXTRACT_{name}"] for name in ("RAW", "SAMPLE", "ZIP"))
+RAW, BLUNT, SAMPLE, ARCHIVE = (os.environ[f"RAIL_EXTRACT_{name}"] for name in ("RAW", "BLUNT", "SAMPLE", "ZIP"))
 NAMES = (
     *("extractrails", "classifyrailpoints", "growrailpoints", "airbornecenterlines"),
     *("rasterizerailpoints", "frpdfcleanup", "vectorizerails"),
@@ -328,6 +330,9 @@ def raw(driver: Driver) -> Iterator:
     driver.keep("systems", {layer.name(): layer.crs().toWkt() for layer in layers})
     driver.keep("bars", [item.text() for item in iface.messageBar().items()])
     yield from _save_all(driver, log)
+    dialog.setParameters({"INPUT": BLUNT, "CLASSIFY": True, "STANDARD": "DETECT"})
+    driver.keep("blunt", (yield from press_run(dialog)).rpartition("starting")[2])
+    driver.picture("raw_blunt")
     yield from close(dialog)
 
 
@@ -449,6 +454,10 @@ def onwards(driver: Driver) -> Iterator:
     export = yield lambda: next((one for one in _dialogs() if one.algorithm().name() == "exportalignment"), None)
     elements = QgsProject.instance().mapLayer(export.mainWidget().wrappers["INPUT"].parameterValue())
     driver.keep("exported", elements.name())
+    designs: dict[int, list[str]] = {}
+    for one in elements.getFeatures():
+        designs.setdefault(one["track_id"], []).append(f"{one['layout']} {one['type']}")
+    driver.keep("designs", list(designs.values()))
     driver.picture("onwards_export")
     yield from close(export)
     yield from close(dialog)
@@ -463,6 +472,30 @@ def onwards(driver: Driver) -> Iterator:
     driver.keep("colours", [one.symbol().color().name() for one in stationed.renderer().categories()])
     driver.keep("groups", _groups())
     driver.picture("onwards_stations")
+    yield from _compare_lifted(driver, layers["Rails"])
+
+
+def _compare_lifted(driver: Driver, rails: QgsVectorLayer) -> Iterator:
+    """Compare rails with a copy of them that lies 10 mm higher."""
+    lift = {"INPUT": rails, "DELTA_Z": 0.01, "OUTPUT": "memory:"}
+    lifted = QgsProject.instance().addMapLayer(processing.run("native:translategeometry", lift)["OUTPUT"])
+    dialog = yield from open_dialog("comparetracks")
+    dialog.setParameters({"REFERENCE": rails.id(), "INPUT": lifted.id()})
+    driver.keep("comparison", (yield from press_run(dialog)))
+    page = Path(dialog.results()["REPORT"]).read_text(encoding="utf-8")
+    driver.keep("compared", re.findall("<h2>(.*?)</h2>", page))
+    yield from close(dialog)
+    (differences,) = (one for one in QgsProject.instance().mapLayers().values() if one.name().startswith("Differences"))
+    iface.mapCanvas().setExtent(differences.extent())
+    yield 1.0
+    driver.picture("onwards_compared")
+    renderer = differences.renderer()
+    expression, context = QgsExpression(renderer.classAttribute()), differences.createExpressionContext()
+    drawn = set()
+    for row in differences.getFeatures():
+        context.setFeature(row)
+        drawn.add(expression.evaluate(context))
+    driver.keep("drawn", [one.label() for one in renderer.categories() if one.value() in drawn])
 
 
 def tried(driver: Driver) -> Iterator:
@@ -816,6 +849,8 @@ def model(driver: Driver) -> Iterator:
     later(designer.actionRun().trigger)
     dialog = yield lambda: window("AlgorithmDialog")
     dialog.mainWidget().wrappers["INPUT"].widget.combo.lineEdit().insert(str(Path(SAMPLE).parent))
+    standards = dialog.mainWidget().wrappers["STANDARD"]
+    driver.keep("standard of the model", [standards.value(), standards.parameterDefinition().help()])
     dialog.setParameters(PART)
     driver.picture("model_dialog")
     driver.keep("log", (yield from press_run(dialog)))

@@ -111,6 +111,13 @@ def test_a_raw_cloud_without_the_tick_is_explained_and_its_rails_are_found(run_s
     assert "Review the findings" in found or "0 findings" in found
 
 
+def test_a_blunt_raw_cloud_is_searched_at_the_gauge_that_it_shows(run_scenario):
+    log = run_scenario("raw")["blunt"]
+    assert re.search(r"No standard has such heads: .* EN 60E1 \(UIC 60\), 1435 mm \(EN_60E1_1435\) is assumed", log)
+    assert "RAIL_COUNT: 2" in log.replace("'", "")
+    assert "Next: Run again as " in log
+
+
 def test_layers_of_a_cloud_without_a_system_have_none(run_scenario):
     session = run_scenario("raw")
     assert set(session["systems"].values()) == {""}
@@ -176,6 +183,9 @@ def test_the_dock_names_the_rail_without_points(run_scenario):
     )
     (reason,) = [reason for reason, text in texts if re.search(named + r"Cross-section at 1\d\.\d m\.$", text)]
     assert reason == "A rail has no points"
+    stated = [text for _, text in texts if "standard error" in text]
+    assert stated
+    assert all(re.search(r"standard error \d+\.\d mm across, \d+\.\d mm in height", text) for text in stated)
 
 
 def test_rails_are_found_and_loaded(run_scenario):
@@ -341,10 +351,26 @@ def test_the_next_step_after_a_fit_exports_its_elements(run_scenario):
     assert session["exported"] == "Elements: sample"
 
 
+def test_three_tracks_of_one_design_have_the_same_elements(run_scenario):
+    session = run_scenario("onwards")
+    plan, cant = ["H line", "H clothoid", "H arc"], ["C constant", "C ramp", "C constant"]
+    assert session["designs"] == 3 * [[*plan, *4 * ["V parabola"], *cant]]
+
+
 def test_a_copy_with_kilometres_has_the_style_of_its_layer(run_scenario):
     session = run_scenario("onwards")
     assert session["aliases"] == ["In doubt [m]", "Kilometre"]
     assert "#d62839" in session["colours"]
+
+
+def test_a_lift_of_all_lines_is_in_the_headline_and_in_the_map(run_scenario):
+    session = run_scenario("onwards")
+    shift = (
+        "The later survey is shifted by +0.0 mm east, +0.0 mm north, +10.0 mm up; apart from that, nothing has moved"
+    )
+    assert shift in session["comparison"]
+    assert {"Rail 1 (left in track 1)", "Rail 2 (right in track 1)"} <= set(session["compared"])
+    assert session["drawn"] == ["shifted with all lines, not moved otherwise"]
 
 
 def test_model_takes_a_folder_and_runs(run_scenario):
@@ -354,3 +380,5 @@ def test_model_takes_a_folder_and_runs(run_scenario):
     made = {name for name, value in session["results"].items() if value}
     assert made == {"rails:RAILS", "centerlines:CENTERLINES", "quality:QUALITY", "quality:REPORT"}
     assert "Execution completed" in session["log"]
+    standard, text = session["standard of the model"]
+    assert standard != "DETECT" and "DETECT" not in text  # steps after the first have no points

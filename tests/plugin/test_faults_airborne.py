@@ -22,7 +22,7 @@ def guided(line, density=10, class_code=2):
 
 FAULTS = {
     "airbornecenterlines": {
-        "neither a guide nor a layer for proposals": lambda bench: {"INPUT": cloud(bench)},
+        "airborne cloud without a guide": lambda bench: {"INPUT": cloud(bench)},
         "guide outside of the cloud": guided("LINESTRING(510000 3000005, 510060 3000005)"),
         "guide in degrees that does not say so": guided("LINESTRING(75 27.12, 75.001 27.12)"),
         "guide that is too short": guided("LINESTRING(500000 3000005, 500012 3000005)"),

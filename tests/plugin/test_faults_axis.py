@@ -84,6 +84,9 @@ FAULTS = {
             POSTS=posts((0, 3, 1.0), (100, 3, 1.1), (350, 3, 1.2), (450, 3, 1.3))
         ),
         "jumps that are not on the axis": given(START_KM=1.0, JUMPS=jumps((7.0, 7.5))),
+        "gaps that are longer than the axis before the first post": given(
+            POSTS=posts((100, 3, 1.48), (300, 3, 1.68)), JUMPS=jumps((1.0, 1.2), (1.25, 1.45))
+        ),
         "table of jumps with other fields": given(
             START_KM=1.0, JUMPS=jumps((1.2, 1.3), fields="&field=a:double&field=b:double")
         ),
@@ -99,6 +102,12 @@ FAULTS = {
         "axis with a vertex outside of any map": given(("LINESTRING(500000 3000000, 1e200 3000000)",), START_KM=1.0),
         "axis with a vertex 1,000,000 km away": given(("LINESTRING(500000 3000000, 999999999 3000000)",), START_KM=1.0),
         "axis with an infinite M value": given((infinite_measure,), "LineStringM"),
+        "axis with an infinite M value, and line breaks in its name": lambda bench: {
+            **given()(bench),
+            "AXIS": layer_of(
+                infinite_measure(), kind="LineStringM", fields="&field=name:string", values=[("7\n  0\nEOF",)]
+            ),
+        },
         "start of an axis that is a text": given(START_KM="km one"),
         "jump to a kilometre of 1e308": given(START_KM=1.0, JUMPS=jumps((1.2, 1e308))),
         "table without places": given((AXIS_M,), "LineStringM", places=("None",)),

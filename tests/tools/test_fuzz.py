@@ -1,8 +1,11 @@
 """The fuzzer itself: the same seed gives the same file, and every way to fail is seen and named."""
 
+import random
+
 import fuzz
 import pytest
 from fuzzing.kinds import KINDS, Kind
+from fuzzing.mutators import damaged
 
 SCRIPT = """
 import os, sys, time
@@ -54,6 +57,11 @@ def test_every_failure_is_seen_and_the_next_file_is_read(tmp_path, monkeypatch):
         5: "SIGABRT script.py",
         6: "hang",
     }
+
+
+def test_damage_changes_a_file(tmp_path):
+    (tmp_path / "zeros").write_bytes(bytes(8))
+    assert all(damaged(tmp_path / "zeros", random.Random(seed)) != bytes(8) for seed in range(200))
 
 
 @pytest.mark.parametrize("name", ["laz", "vpc"])

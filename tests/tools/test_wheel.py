@@ -12,8 +12,8 @@ ROOT = Path(__file__).resolve().parents[2]
 PIP = [sys.executable, "-m", "pip", "--disable-pip-version-check", "-q"]
 
 EXAMPLES = """
-import doctest, rail_extract, rail_extract.core.front, rail_extract.core.clouds.points
-for module in (rail_extract, rail_extract.core.front, rail_extract.core.clouds.points):
+import doctest, rail_extract, rail_extract.core.commands.front, rail_extract.core.clouds.points
+for module in (rail_extract, rail_extract.core.commands.front, rail_extract.core.clouds.points):
     assert module.__file__.startswith({folder!r}), module.__file__
     failed, attempted = doctest.testmod(module, optionflags=doctest.NORMALIZE_WHITESPACE)
     assert attempted and not failed, module
@@ -48,7 +48,7 @@ def test_wheel_holds_the_core_its_weights_and_the_sample_only(wheel):
     names = zipfile.ZipFile(wheel).namelist()
     folders = {"/".join(name.split("/")[:2]) for name in names if name.count("/") > 1}
     assert folders == {"rail_extract/core", "rail_extract/models", "rail_extract/resources"}
-    expected = ["py.typed", "core/front.py", "models/frpdf_fast.npz", "resources/sample/sample.laz"]
+    expected = ["py.typed", "core/commands/front.py", "models/frpdf_fast.npz", "resources/sample/sample.laz"]
     assert {f"rail_extract/{name}" for name in expected} <= set(names)
 
 

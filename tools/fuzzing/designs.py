@@ -9,22 +9,23 @@ import re
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from osgeo import gdal, ogr, osr
-from qgis.core import QgsFeature, QgsProcessingContext, QgsWkbTypes
+from qgis.core import QgsFeature, QgsFeatureRequest, QgsProcessingContext, QgsVectorLayer, QgsWkbTypes
 from rail_extract.core.alignment.elements import Alignment, CantElement, VerticalElement, chained
-from rail_extract.core.alignment.landxml_reading import read_landxml
-from rail_extract.core.alignment.table import rows
 from rail_extract.core.design_numbers import MAX_KM, MAX_PLACE_M
+from rail_extract.core.files.design_files import write_designs
+from rail_extract.core.files.landxml_reading import read_landxml
+from rail_extract.core.files.table import rows
 from rail_extract.core.frame import LocalFrame
-from rail_extract.core.output.design_files import write_designs
 from rail_extract.core.standards import STANDARDS
 
-from .clouds import write_las
-from .layers import check, run
+from .clouds import small_cloud
+from .layers import check, compact, run
 
 gdal.UseExceptions()
 
@@ -41,6 +42,18 @@ VALUES = (
     *("7\n  0\nENDSEC\n  0\nEOF", "٣", "<&\">'", "\x00\x1b", "H", "clothoid", "9" * 400, "x" * 3000),
 )
 """Values that take the place of a coordinate or an attribute."""
+
+CLOUD = "cloud.las"
+
+USES = {
+    "seeds": ("SEEDS", {"growrailpoints": {"OUTPUT": "out.las"}}),
+    "mask": ("MASK", {"classifyrailpoints": {"OUTPUT": "out.las"}}),
+    "guide": (
+        "GUIDE",
+        {"classifyrailpoints": {"OUTPUT": "out.las"}, "airbornecenterlines": {"CENTERLINES": "centerlines.gpkg"}},
+    ),
+}
+"""Layers of areas: the parameter that takes each, and the algorithms that have it, with their outputs."""
 
 FURTHER = MAX_PLACE_M + 1e6
 """What no coordinate, station or length of a result exceeds."""
@@ -73,7 +86,8 @@ def _design() -> Alignment:
     return Alignment(7, LocalFrame(np.array([EAST, NORTH, 0.0])), plan, profile, cant)
 
 
-def _good(name: str) -> list[Row]:
+@cache
+def _good(name: str) -> tuple[Row, ...]:
     """Return the features of an undamaged layer."""
 
     def at(*places: tuple[float, ...]) -> tuple[tuple[float, ...], ...]:
@@ -98,17 +112,16 @@ def _good(name: str) -> list[Row]:
         "mask": [Row("Polygon", square, {"name": "A"}), Row("Polygon", square[::-1], {"name": "B"})],
         "seeds": [Row("LineString", at((0, 0), (5, 1), (60, 2)), {"n": 1}), Row("LineString", at((1, 1), (3, 3)), {})],
     }
-    return made[name]
+    return tuple(made[name])
 
 
 def write(folder: Path, name: str) -> list[Path]:
-    """Write a layer in every format, an axis that is not damaged, and a cloud."""
-    write_las(folder)
+    """Write a layer in every format, and the cloud in which an area is."""
+    if name in USES:
+        small_cloud("1.4", 7).write(folder / CLOUD)
     for suffix in (".geojson", *DRIVERS):
         _put(folder / f"{name}{suffix}", _good(name))
-    for other in ("axis", "places"):
-        if other != name:
-            _put(folder / f"{other}.gpkg", _good(other))
+    compact(folder / f"{name}.gpkg")
     return sorted(folder.glob(f"{name}.*"))
 
 
@@ -121,16 +134,17 @@ def write_xml(folder: Path) -> list[Path]:
 
 def change_values(path: Path, rng: random.Random) -> None:
     """Write a layer again with one to three other coordinates or attributes."""
-    found = _good(path.stem)
-    for _ in range(rng.choice((1, 1, 2, 3))):
-        at = rng.randrange(len(found))
-        found[at] = _changed(found[at], rng)
-    if rng.random() < 0.1:
-        found += found[: rng.randint(1, 2)]
+    found = list(_good(path.stem))
+    while tuple(found) == _good(path.stem):
+        for _ in range(rng.choice((1, 1, 2, 3))):
+            at = rng.randrange(len(found))
+            found[at] = _changed(found[at], rng)
+        if rng.random() < 0.1:
+            found += found[: rng.randint(1, 2)]
     for old in path.parent.glob(f"{path.stem}.*"):
         if old.suffix == path.suffix or (path.suffix not in (*DRIVERS, ".geojson") and old.suffix in DRIVERS):
             old.unlink()
-    with suppress(RuntimeError):  # what GDAL does not write is another good file
+    with suppress(RuntimeError):  # what GDAL does not write is cut off there
         _put(_main(path), found)
 
 
@@ -234,27 +248,31 @@ def read_elements(path: Path) -> None:
 def read_axis(path: Path) -> None:
     """Locate places along a damaged axis: with M values where the format has them, else with a first kilometre."""
     start = {} if path.suffix in (".gpkg", ".shp") else {"START_KM": 1.0}
-    _locate({"AXIS": str(_main(path)), "INPUT": str(path.with_name("places.gpkg")), **start})
+    _locate({"AXIS": str(_main(path)), "INPUT": _undamaged("places"), **start})
 
 
 def read_posts(path: Path) -> None:
     """Locate places along an axis with damaged posts."""
-    _locate({"POSTS": str(_main(path)), "AXIS": _axis(path), "INPUT": str(path.with_name("places.gpkg"))})
+    _locate({"POSTS": str(_main(path)), "AXIS": _undamaged("axis"), "INPUT": _undamaged("places")})
 
 
 def read_jumps(path: Path) -> None:
     """Locate places along an axis with damaged jumps."""
-    places = str(path.with_name("places.gpkg"))
-    _locate({"JUMPS": str(_main(path)), "AXIS": _axis(path), "INPUT": places, "START_KM": 1.0})
+    others = {"AXIS": _undamaged("axis"), "INPUT": _undamaged("places")}
+    _locate({"JUMPS": str(_main(path)), **others, "START_KM": 1.0})
 
 
 def read_places(path: Path) -> None:
     """Locate damaged places."""
-    _locate({"INPUT": str(_main(path)), "AXIS": _axis(path), "START_KM": 1.0})
+    _locate({"INPUT": str(_main(path)), "AXIS": _undamaged("axis"), "START_KM": 1.0})
 
 
-def _axis(path: Path) -> str:
-    return str(path.with_name("axis.gpkg"))
+@cache
+def _undamaged(name: str) -> QgsVectorLayer:
+    """Return another layer, which is opened once only: opening takes longer than all that follows."""
+    path = f"/vsimem/{name}.gpkg"
+    _put(Path(path), _good(name))
+    return QgsVectorLayer(path, name, "ogr").materialize(QgsFeatureRequest())
 
 
 def _locate(parameters: dict[str, Any]) -> None:
@@ -268,14 +286,10 @@ def _locate(parameters: dict[str, Any]) -> None:
 
 def read_area(path: Path) -> None:
     """Check the values of the algorithms that take seeds, a guide or a mask; they read them then."""
-    cloud, layer = {"INPUT": str(path.with_name("1.4_7.las"))}, str(_main(path))
-    if path.stem == "seeds":
-        check("growrailpoints", {"SEEDS": layer, **cloud, "OUTPUT": str(path.with_name("out.las"))})
-    elif path.stem == "mask":
-        check("classifyrailpoints", {"MASK": layer, **cloud, "OUTPUT": str(path.with_name("out.las"))})
-    else:
-        check("classifyrailpoints", {"GUIDE": layer, **cloud, "OUTPUT": str(path.with_name("out.las"))})
-        check("airbornecenterlines", {"GUIDE": layer, **cloud, "CENTERLINES": "memory:"})
+    (name, algorithms), context = USES[path.stem], QgsProcessingContext()
+    given = {"INPUT": str(path.with_name(CLOUD)), name: str(_main(path))}
+    for algorithm, outputs in algorithms.items():
+        check(algorithm, {**given, **{key: str(path.with_name(out)) for key, out in outputs.items()}}, context)
 
 
 def _features(layer_id: str, context: QgsProcessingContext) -> Iterator[QgsFeature]:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from .clouds import RAIL, SHAPES, write_copc, write_las, write_laz, write_vpc
-from .mutators import mutator_for
+from .mutators import damaged
 
 LINES = ("gpkg", "geojson", "shp")
 """Formats of rails."""
@@ -64,7 +64,7 @@ class Kind:
         if self.remake is not None and rng.random() < 0.5:
             self.remake(path, rng)
         else:
-            path.write_bytes(mutator_for(path)(path.read_bytes(), rng))
+            path.write_bytes(damaged(path, rng))
         return path
 
     def copied(self, folder: Path, path: Path) -> Path:
@@ -118,7 +118,7 @@ def _read_spool(path: Path) -> None:
 
 def _spooled(cloud: Path, folder: Path) -> Sequence:
     from rail_extract.core.clouds.points import ask
-    from rail_extract.core.squares.spool import spool
+    from rail_extract.core.tiles.spool import spool
 
     return spool(ask(cloud, [RAIL]), SPOOL_SIDE_M, folder)
 
@@ -128,9 +128,9 @@ def _make_stored(folder: Path) -> list[Path]:
     from rail_extract.core.frame import LocalFrame
     from rail_extract.core.rails import RailLine
     from rail_extract.core.raster import rasterize
-    from rail_extract.core.squares.grid import Square
     from rail_extract.core.squares.kept import save
     from rail_extract.core.squares.pieces import SquareRails
+    from rail_extract.core.tiles.grid import Square
 
     xyz = np.random.default_rng(0).uniform(0, 20, (500, 3))
     rail = RailLine(xyz, 1, 10, points=500, resid_mm=1.0, sigma_mm=1.0, bridged_m=0.0)
@@ -209,11 +209,12 @@ def _make_shapes(folder: Path) -> list[Path]:
 def _read_shapes(path: Path) -> None:
     """Read a vector file as the commands do, for a cloud in another coordinate system."""
     from rail_extract.core.clouds.crs import import_pyproj
-    from rail_extract.core.commands import vectors
+    from rail_extract.core.commands.vectors import read_features
+    from rail_extract.core.jobs.features import read_lines_along, read_mask, read_seeds
 
     wkt = import_pyproj().CRS.from_epsg(32643).to_wkt()
-    for read in (vectors.read_seeds, vectors.read_lines, vectors.read_mask):
-        read(path, wkt)
+    for read in (read_seeds, read_lines_along, read_mask):
+        read(read_features(path, "LAYER"), wkt)
 
 
 def _make_names(folder: Path) -> list[Path]:

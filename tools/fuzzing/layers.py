@@ -27,6 +27,7 @@ from qgis.core import (  # noqa: E402
     QgsVectorFileWriter,
     QgsVectorLayer,
 )
+from rail_extract.core.clouds import points, readers  # noqa: E402
 from rail_extract.core.errors import RailExtractError  # noqa: E402
 from rail_extract.core.progress import Progress  # noqa: E402
 from rail_extract.core.squares import steps  # noqa: E402
@@ -71,6 +72,7 @@ def qgis() -> QgsApplication:
         qgis.plugin = classFactory(None)  # type: ignore[attr-defined]
         qgis.plugin.initProcessing()  # type: ignore[attr-defined]
         centerlines.tracks_of, steps.lines_of = remembered(centerlines.tracks_of), remembered(steps.lines_of)
+        points.read_header = readers.read_header = remembered(readers.read_header)  # of clouds that are not damaged
     return application
 
 
@@ -104,20 +106,25 @@ def write_lines(folder: Path, suffix: str) -> list[Path]:
     path = folder / f"lines.{suffix}"
     QgsVectorFileWriter.writeAsVectorFormatV3(layer, str(path), QgsCoordinateTransformContext(), options)
     if suffix == "gpkg":
-        with closing(connect(path)) as database:
-            database.execute(f"PRAGMA page_size = {PAGE_BYTES}")
-            database.execute("VACUUM")
+        compact(path)
     return sorted(folder.glob("lines.*"))
+
+
+def compact(path: Path) -> None:
+    """Give a GeoPackage small pages without gaps."""
+    with closing(connect(path)) as database:
+        database.execute(f"PRAGMA page_size = {PAGE_BYTES}")
+        database.execute("VACUUM")
 
 
 def write_raster(folder: Path) -> list[Path]:
     """Write a small rail raster."""
     from rail_extract.core.clouds.crs import import_pyproj
+    from rail_extract.core.files.raster_file import header_for
     from rail_extract.core.frame import LocalFrame
-    from rail_extract.core.output.raster_file import header_for
     from rail_extract.core.raster import rasterize
     from rail_extract.core.standards import STANDARDS
-    from rail_extract.rail_extract_plugin.reading.geotiff import write_rasters
+    from rail_extract.rail_extract_plugin.writing.geotiff import write_rasters
 
     qgis()
     raster = rasterize(np.random.default_rng(0).uniform(0, 4, (200, 2)), 0.04)
@@ -156,22 +163,19 @@ def run(name: str, parameters: dict[str, Any]) -> Iterator[tuple[dict[str, Any],
     AssertionError
         It failed without an explanation.
     """
-    algorithm, context, listener = check(name, parameters), QgsProcessingContext(), Listener()
-    results, succeeded = algorithm.run(parameters, context, listener)
+    context, listener = QgsProcessingContext(), Listener()
     try:
+        results, succeeded = check(name, parameters, context).run(parameters, context, listener)
         _judge(succeeded, "\n".join(listener.errors).strip())
         yield results, context
     finally:
         context.temporaryLayerStore().removeAllMapLayers()
 
 
-def check(name: str, parameters: dict[str, Any]) -> QgsProcessingAlgorithm:
+def check(name: str, parameters: dict[str, Any], context: QgsProcessingContext) -> QgsProcessingAlgorithm:
     """Check the values of an algorithm, as QGIS does; errors as for `run`."""
     algorithm = qgis().processingRegistry().createAlgorithmById(f"railextract:{name}")
-    context = QgsProcessingContext()
-    accepted = algorithm.checkParameterValues(parameters, context)
-    context.temporaryLayerStore().removeAllMapLayers()
-    _judge(*accepted)
+    _judge(*algorithm.checkParameterValues(parameters, context))
     return algorithm
 
 

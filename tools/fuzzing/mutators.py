@@ -55,9 +55,12 @@ def mutate_text(data: bytes, rng: random.Random) -> bytes:
     return _replace_word(data, rng) if rng.random() < 0.5 else mutate(data, rng)
 
 
-def mutator_for(path: Path) -> Callable[[bytes, random.Random], bytes]:
-    """Return what damages a file: a text word by word as well."""
-    return mutate_text if path.suffix in TEXTS else mutate
+def damaged(path: Path, rng: random.Random) -> bytes:
+    """Return the bytes of a file with damage, never as they are; a text is damaged word by word as well."""
+    mutator, good = mutate_text if path.suffix in TEXTS else mutate, path.read_bytes()
+    while (data := mutator(good, rng)) == good:
+        pass
+    return data
 
 
 def _place(data: bytes, rng: random.Random) -> int:

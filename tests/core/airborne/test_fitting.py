@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from rail_extract.core.airborne.axis import axis_of_guide
 from rail_extract.core.airborne.fitting import EMPTY, HIDDEN, MISLED, SEEN, TWIN, UNSURE, fit_tracks
+from rail_extract.core.airborne.guide_line import axis_of_guide
 from rail_extract.laboratory.airborne.designs import SPACING_M, box
 from rail_extract.laboratory.airborne.flight import Flight, fly
 from rail_extract.laboratory.airborne.ground import Axis, Band, World

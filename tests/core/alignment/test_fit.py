@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 from rail_extract.core.alignment.elements import Alignment, CantElement, VerticalElement, chained
 from rail_extract.core.alignment.fit import fit_track, fit_tracks
-from rail_extract.core.alignment.given import noted
+from rail_extract.core.alignment.held import noted, round_radius
 from rail_extract.core.alignment.measured import Track
-from rail_extract.core.alignment.rounding import round_radius
-from rail_extract.core.alignment.table import alignments, rows
 from rail_extract.core.errors import ParameterError
 from rail_extract.core.fields import ELEMENT_FIELDS
+from rail_extract.core.files.table import alignments, rows
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.parameters import FitParameters
 from rail_extract.core.progress import Progress, Recording
@@ -103,6 +102,17 @@ def test_errors_of_a_smoothed_line_are_not_taken_for_elements(seed):
     assert [x.type for x in found.plan] == ["line", "clothoid", "arc", "clothoid", "line"]
     assert 1 / found.plan[2].k_from == pytest.approx(-1200, rel=0.005)
     assert len(found.vertical) == 1
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_cant_that_waves_by_less_than_a_survey_shows_has_the_elements_of_its_clothoids(seed):
+    one, s = design(), np.arange(521.0)
+    phase = np.random.default_rng(seed).uniform(0, 2 * np.pi, 2)
+    waves = 0.0004 * np.sin(s / 12 + phase[0]) + 0.0003 * np.sin(s / 5 + phase[1])
+    cant, line = np.column_stack([s, one.cants(s) + waves]), surveyed(one, np.random.default_rng(seed), 0.0005)
+    found = fit(Track(1, line, cant, np.zeros(len(s), dtype=bool))).alignment
+    np.testing.assert_allclose([part.s_from for part in found.cant], [0, 120, 180, 330, 380], atol=0.5)
+    np.testing.assert_allclose([part.cant_from_m for part in found.cant], [0, 0, -0.08, -0.08, 0], atol=0.0006)
 
 
 def test_a_straight_stays_one_element():

@@ -11,7 +11,7 @@ from rail_extract.core.frame import LocalFrame
 from rail_extract.core.parameters import Parameters
 from rail_extract.core.progress import Progress
 from rail_extract.core.rails import RailLine, SearchFigures
-from rail_extract.core.squares.grid import MemorySource
+from rail_extract.core.tiles.grid import MemorySource
 from rail_extract.laboratory.curves import Element, trace, transition_curve
 from rail_extract.laboratory.scenes.adversarial import from_the_side
 from rail_extract.laboratory.scenes.raw_strips import strip

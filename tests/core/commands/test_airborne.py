@@ -48,22 +48,11 @@ def test_all_outputs_are_written(flown, tmp_path, capsys):
     assert stations["seen"].sum() >= 14
 
 
-def test_proposed_guides_lead_to_lines_on_two_workers(flown, tmp_path, capsys):
-    options = ["airborne", str(flown / "air.laz"), "--footprint", "0.25", "--workers", "2"]
-    assert main([*options, "--proposed", str(tmp_path / "proposed.gpkg")]) == 0
-    assert "Proposed 1 guide" in capsys.readouterr().out
-    guide = ["--guide", str(tmp_path / "proposed.gpkg"), "--centerlines", str(tmp_path / "out.gpkg")]
-    assert main([*options, *guide]) == 0
-    _, _, shapes, columns = pyogrio.raw.read(tmp_path / "out.gpkg", layer="centerlines", columns=["seen_m"])
-    assert len(shapes) == 1
-    assert columns[0][0] >= 120
-
-
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["--centerlines", "out.gpkg"], "--guide is empty: choose lines along the tracks, or --proposed to have some"),
-        (["--proposed", "p.gpkg", "--classes", "256"], '--classes "256" must be whole numbers from 0 to 255 such as'),
+        (["--centerlines", "out.gpkg"], "--guide is empty: draw lines along the tracks, or import them"),
+        (["--centerlines", "p.gpkg", "--classes", "256"], '--classes "256" must be whole numbers from 0 to 255'),
     ],
 )
 def test_a_mistake_gets_a_sentence(flown, tmp_path, capsys, monkeypatch, words, message):
@@ -73,9 +62,12 @@ def test_a_mistake_gets_a_sentence(flown, tmp_path, capsys, monkeypatch, words, 
     assert not list(tmp_path.iterdir())
 
 
-def test_an_output_that_a_run_does_not_make_is_said(flown, tmp_path, capsys):
-    assert run(flown, tmp_path, "--proposed", str(tmp_path / "proposed.gpkg")) == 0
-    assert "--proposed is not written: a run with these inputs does not make it." in capsys.readouterr().err
+def test_an_output_that_is_no_longer_made_is_said(flown, tmp_path, capsys):
+    assert run(flown, tmp_path, "--workers", "2", "--proposed", str(tmp_path / "proposed.gpkg")) == 0
+    said = capsys.readouterr().err
+    assert "--proposed is not written: a run with these inputs does not make it." in said
+    assert "Guides are not proposed: draw them, or import them" in said
+    assert not (tmp_path / "proposed.gpkg").exists()
 
 
 def test_polygons_as_guide_are_refused(flown, tmp_path, capsys):

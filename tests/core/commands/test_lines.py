@@ -1,13 +1,16 @@
-"""The commands of alignments, one after another, and what Python gives as functions of the same names."""
+"""The commands of alignments and kilometres, and what Python gives as functions of the same names."""
 
 import json
 import re
 
 import numpy as np
 import pytest
+import rail_extract as rx
 from rail_extract.__main__ import main
 from rail_extract.core.alignment.elements import Alignment, VerticalElement, chained
+from rail_extract.core.errors import ParameterError, RailExtractError
 from rail_extract.core.frame import LocalFrame
+from rail_extract.core.progress import SILENT, Recording
 from rail_extract.laboratory.designs import surveyed
 
 pyogrio, shapely = pytest.importorskip("pyogrio"), pytest.importorskip("shapely")
@@ -120,9 +123,9 @@ def test_places_have_their_kilometre_along_an_axis(tmp_path, decreasing):
     written(tmp_path / "axis.gpkg", "axis", [CORNER + [[0, 0, 0], [1000, 0, 0]]], name=["main"])
     points(tmp_path / "places.json", [(CORNER[:2] + [250, 3]).tolist(), (CORNER[:2] + [900, -4]).tolist()])
     out = tmp_path / "out.gpkg"
-    values = [str(tmp_path / "places.json"), str(tmp_path / "axis.gpkg"), str(out), "--start-km", "12.0"]
-    assert main(["stations", *values, *(["--decreasing"] if decreasing else [])]) == 0
-    rows, shapes = table(out, "stations")
+    values = [str(tmp_path / "places.json"), str(tmp_path / "axis.gpkg"), "--output", str(out), "--start-km", "12.0"]
+    assert main(["station", *values, *(["--direction", "DECREASING"] if decreasing else [])]) == 0
+    rows, shapes = table(out, "places")
     np.testing.assert_allclose(rows["km"], [11.75, 11.1] if decreasing else [12.25, 12.9], atol=1e-6)
     np.testing.assert_allclose(rows["offset_m"], [-3, 4] if decreasing else [3, -4], atol=1e-3)
     assert rows["name"].tolist() == ["0", "1"]
@@ -131,17 +134,70 @@ def test_places_have_their_kilometre_along_an_axis(tmp_path, decreasing):
 
 def test_an_axis_may_state_kilometres_as_m_values(tmp_path):
     place = tmp_path / "km.gpkg"
-    measured_line = pytest.importorskip("rail_extract.core.output.writing").measured_line
+    measured_line = pytest.importorskip("rail_extract.core.files.writing").measured_line
     line = measured_line(np.array([[*CORNER, 3.0], [*CORNER + [1000, 0, 0], 4.0]]))
     pyogrio.raw.write(str(place), layer="axis", driver="GPKG", geometry_type="Unknown", crs="EPSG:25832",
                       geometry=np.array([line], object),
                       field_data=[np.array(["main"])], fields=["name"])  # fmt: skip
     points(tmp_path / "places.json", [(CORNER[:2] + [250, 3]).tolist()])
     out = tmp_path / "out.gpkg"
-    assert main(["stations", str(tmp_path / "places.json"), str(place), str(out), "--format", "KILOMETRES"]) == 0
-    rows, _ = table(out, "stations")
+    values = [str(tmp_path / "places.json"), str(place), "--output", str(out), "--format", "KILOMETRES"]
+    assert main(["station", *values]) == 0
+    rows, _ = table(out, "places")
     assert rows["km"][0] == pytest.approx(3.25)
     assert rows["km_text"][0] == "3+250.00"
+
+
+def layer_of(path, shapes, **properties):
+    """Write shapes beside an axis of 1 km, in EPSG:25832; the axis is in another file."""
+    features = [
+        {"type": "Feature", "properties": {name: values[number] for name, values in properties.items()},
+         "geometry": shape and json.loads(shapely.to_geojson(shapely.transform(shape, lambda xy: xy + CORNER[:2])))}
+        for number, shape in enumerate(shapes)
+    ]  # fmt: skip
+    crs = {"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::25832"}}
+    path.write_text(json.dumps({"type": "FeatureCollection", "crs": crs, "features": features}))
+    written(path.with_name("axis.gpkg"), "axis", [CORNER + [[0, 0, 0], [1000, 0, 0]]], name=["main"])
+    return path, path.with_name("axis.gpkg")
+
+
+def test_python_gives_lines_and_polygons_the_kilometres_of_their_ends(tmp_path):
+    shapes = [shapely.LineString([(100, 4), (300, 4)]), shapely.box(500, 1, 600, 9), shapely.Point(2000, 0), None]
+    places, axis = layer_of(tmp_path / "places.json", shapes, km=[7.0, 8.0, 9.0, 10.0])
+    said = Recording(SILENT)
+    found = rx.station(places, axis, tmp_path / "out.gpkg", start_km=2.0, progress=said)
+    assert found.figures == {"PLACE_COUNT": 2, "BEYOND_COUNT": 2, "AMBIGUOUS_COUNT": 0}
+    assert found.sentences == ("2 of 4 features have a kilometre.",)
+    assert list(said.warnings) == ["1 of 3 places are beyond the ends of AXIS: their kilometres are empty."]
+    rows, copied = table(tmp_path / "out.gpkg", "places")
+    assert rows["km"].tolist() == [7.0, 8.0, 9.0, 10.0]
+    np.testing.assert_allclose(rows["km_2"], [2.2, 2.55, np.nan, np.nan])
+    np.testing.assert_allclose(rows["km_from"], [2.1, 2.5, np.nan, np.nan])
+    np.testing.assert_allclose(rows["km_to"], [2.3, 2.6, np.nan, np.nan])
+    assert rows["side"].tolist() == ["left", "left", None, None]
+    assert [shape and shape.geom_type for shape in copied] == ["LineString", "Polygon", "Point", None]
+    pytest.importorskip("geopandas")
+    frame = found.to_geodataframe("output")
+    assert (frame.crs.to_epsg(), frame["km_2"].tolist()[:2]) == (25832, [2.2, 2.55])
+
+
+def test_points_with_kilometres_go_into_a_table_and_polygons_do_not(tmp_path):
+    axis_of = {"start_km": 2.0}
+    places, axis = layer_of(tmp_path / "places.json", [shapely.Point(100, 4), shapely.Point(5000, 0)], sign=["A", None])
+    rx.station(places, axis, tmp_path / "out.csv", **axis_of)
+    head, first, second = (tmp_path / "out.csv").read_text().splitlines()
+    assert head == "WKT,sign,axis,piece,km,km_text,offset_m,side,ambiguous"
+    assert first == "POINT (578300.0000 5804304.0000),A,main,1,2.1,2.1+00.00,4.0,left,0"
+    assert second == "POINT (583200.0000 5804300.0000),,,,,,,,"
+    places, axis = layer_of(tmp_path / "areas.json", [shapely.box(500, 1, 600, 9)])
+    with pytest.raises(ParameterError, match="out.csv can only have points, or only lines: choose a GeoPackage"):
+        rx.station(places, axis, tmp_path / "out.csv", **axis_of)
+
+
+def test_a_table_without_places_is_refused(tmp_path):
+    places, axis = layer_of(tmp_path / "places.json", [None], sign=["A"])
+    with pytest.raises(RailExtractError, match="input is a table without places: give a layer of points"):
+        rx.station(places, axis, tmp_path / "out.gpkg", start_km=2.0)
 
 
 @pytest.mark.parametrize(
@@ -157,8 +213,8 @@ def test_an_axis_may_state_kilometres_as_m_values(tmp_path):
         (["import-alignment", "{tracks}", "--elements", "out.gpkg"], "GeoPackage"),
         (["import-alignment", "{xml}", "--deviations", "out.gpkg"], "choose --tracks"),
         (["compare", "{tracks}", "{tracks}", "--rails", "{tracks}"], "choose --reference-rails, too"),
-        (["stations", "{tracks}", "{tracks}", "out.gpkg"], "AXIS has no M values"),
-        (["stations", "{tracks}", "{tracks}", "out.gpkg", "--posts", "{tracks}"], "POSTS has no field"),
+        (["station", "{tracks}", "{tracks}", "--output", "out.gpkg"], "AXIS has no M values"),
+        (["station", "{tracks}", "{tracks}", "--output", "out.gpkg", "--posts", "{tracks}"], "--posts has no field"),
     ],
 )
 def test_bad_input_is_one_sentence(folder, tmp_path, monkeypatch, capsys, values, words):

@@ -154,7 +154,7 @@ def test_a_guide_across_the_tracks_is_noticed(save, tmp_path, capsys):
         (["--rail-class", "256"], "--rail-class can't be 256: give a number from 0 to 255."),
         (["--guide", "nothing.json"], "nothing.json can't be read as a vector file: give a GeoPackage or GeoJSON"),
         (["--guide", "far.json"], "The guide has no line within 4 m of the cloud: check its place and coordinate"),
-        (["--guide", "empty.json"], "empty.json has no lines: give lines along the tracks."),
+        (["--guide", "empty.json"], "--guide has no lines: give a line layer."),
     ],
 )
 def test_each_mistake_of_a_search_gets_a_sentence(save, tmp_path, capsys, monkeypatch, options, message):

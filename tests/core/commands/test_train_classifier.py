@@ -5,33 +5,17 @@ import numpy as np
 import pytest
 from rail_extract.__main__ import INTERRUPTED, main
 from rail_extract.core.classify.settings import Settings
-from rail_extract.laboratory.scenes.raw_shapes import flat, rough, with_bar, with_track
+from rail_extract.laboratory.scenes.raw_shapes import track_beside_kerb
 
 torch = pytest.importorskip("torch")
 
-from rail_extract.core.learned import training  # noqa: E402
 from rail_extract.laboratory.ruler.whole_clouds import classify_cloud  # noqa: E402
 
 SIDE_M = Settings((1.435,), 0.072).side_m
 CORNER = np.array([round(500_000 / SIDE_M) * SIDE_M, round(5_000_000 / SIDE_M) * SIDE_M, 100.0])
 
 
-@pytest.fixture(autouse=True)
-def _small(monkeypatch):
-    """Make steps fast, also on computers that do other work: small operations wait for the slowest thread."""
-    monkeypatch.setattr(training, "BATCH", 2)
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)
-    yield
-    torch.set_num_threads(threads)
-
-
-def scene():
-    """12 m of track in four areas, with a kerb as high as the rails; which points are on heads."""
-    rng = np.random.RandomState(3)
-    xyz, on = with_track(flat(12.0, rng=rng, per_m2=400), 1.435, 0.072, 0.3)
-    xyz, kerb = with_bar(xyz, 0.5, 0.3, 3.0)
-    return rough(xyz, rng), on & ~kerb
+pytestmark = pytest.mark.usefixtures("small_training")
 
 
 @pytest.fixture
@@ -50,7 +34,7 @@ def save(tmp_path):
 
 @pytest.fixture
 def labelled(save):
-    xyz, on = scene()
+    xyz, on = track_beside_kerb(400)
     west = xyz[:, 0] < 20
     return [save(f"{name}.laz", xyz[part], np.where(on, 10, 2)[part]) for name, part in (("w", west), ("e", ~west))]
 
@@ -65,7 +49,7 @@ def test_weights_label_the_cloud_and_the_card_describes_them(labelled, save, tmp
     assert "w.laz" in page or "e.laz" in page
     for part in ("Rail classes", "8, ", "112,769 weights", "<svg"):
         assert part in page
-    xyz, on = scene()
+    xyz, on = track_beside_kerb(400)
     raw = save("raw.laz", xyz, np.full(len(xyz), 2))
     new = tmp_path / "new.laz"
     assert main(["classify", raw, "--output", str(new), "--method", "LEARNED", "--weights", str(weights)]) == 0
@@ -99,7 +83,7 @@ def test_a_training_continues_after_its_time(labelled, tmp_path, capsys):
 
 def labels(change):
     def make(save):
-        xyz, on = scene()
+        xyz, on = track_beside_kerb(400)
         xyz, codes = change(xyz, np.where(on, 10, 2))
         return [save("labelled.laz", xyz, codes)]
 

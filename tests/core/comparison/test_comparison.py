@@ -73,6 +73,7 @@ def test_three_standard_errors_are_the_limit():
     for across_m, moved in ((0.0029, False), (0.0031, True)):
         found = compare(survey(curve(), sigma_mm=1.0), survey(curve(across_m), sigma_m=0.0), ignore_shift=False)
         assert found.lines[0].moved.all() == found.lines[0].moved.any() == moved
+        assert found.lines[0].shifted.all() == found.lines[0].shifted.any() == moved
 
 
 def test_without_stated_errors_the_scatter_of_the_differences_counts():

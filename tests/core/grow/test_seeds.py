@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as some
 from rail_extract.core.grow.follow import Reason
-from rail_extract.core.grow.seeds import Growths
+from rail_extract.core.grow.growth import APART, Growths, apart_first
 from rail_extract.core.grow.settings import GrowSettings
 from rail_extract.core.parameters import GrowParameters
 from rail_extract.laboratory.ruler.whole_clouds import GrowingCloud
@@ -18,7 +18,7 @@ CLOUD = GrowingCloud(TRACK.xyz, GrowSettings(GAUGE_M, WIDTH_M, GrowParameters())
 def grown(places, track=TRACK, heads=CLOUD.heads, **changes):
     """Grow from places along and to the left of the middle, each a seed of its own; returns also which are on rails."""
     made = Growths(heads, GrowSettings(GAUGE_M, WIDTH_M, GrowParameters(**changes)))
-    is_on = [made.add([track.at(along, left)]) for along, left in places]
+    is_on = [made.add(track.at(along, left)) for along, left in places]
     made.reach_on()
     return made, is_on
 
@@ -67,3 +67,28 @@ def test_a_rail_beside_one_that_has_grown_grows_as_well():
     made, is_on = grown([(10.0, 0.5), (10.0, 0.5 - beside_m)], two, cloud.heads, both=False)
     assert is_on == [True, True]
     assert [round(float(np.median(growth.rails[0].xyz[:, 1])), 2) for growth in made.grown] == [0.5, 0.3]
+
+
+def test_a_long_line_of_seeds_grows_almost_nothing_twice():
+    places = np.array([TRACK.at(at, SPACING_M / 2) for at in np.arange(2.0, 39.0, 0.4)])
+    made = Growths(CLOUD.heads, GrowSettings(GAUGE_M, WIDTH_M, GrowParameters(max_length_m=5.0)))
+    is_on = [made.add(places[at]) for at in apart_first(places, APART * 5.0)]
+    made.reach_on()
+    low, high = reached(made)
+    assert all(is_on)
+    assert sum(growth.rails[0].length_m for growth in made.grown) < 1.4 * (high - low)
+
+
+@given(
+    some.lists(some.tuples(some.integers(0, 99), some.integers(0, 9)), min_size=1, max_size=40), some.floats(0.5, 60.0)
+)
+def test_places_far_apart_come_first_and_all_come_once(places, apart_m):
+    xy = np.array(places, dtype=float)
+    order = apart_first(xy, apart_m)
+    assert sorted(order) == list(range(len(xy)))
+    first = [xy[order[0]]]
+    for at in order[1:]:
+        if min(np.hypot(*(xy[at] - one)) for one in first) <= apart_m:
+            break
+        first.append(xy[at])
+    assert all(min(np.hypot(*(one - other)) for other in first) <= apart_m for one in xy)

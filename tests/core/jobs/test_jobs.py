@@ -162,3 +162,14 @@ def test_a_function_gives_layers_figures_and_a_report(tmp_path):
     assert counts[0] == counts[1] > 35
     with pytest.raises(ParameterError, match="There is no layer 'rails': choose one of output"):
         result.save(tmp_path / "out.csv", "rails")
+
+
+def test_a_constant_shift_of_all_lines_is_said_apart(tmp_path):
+    angle = np.linspace(0, 250 / 300, 501)
+    curve = np.column_stack([300 * np.sin(angle), 300 - 300 * np.cos(angle), np.zeros(501)]) + [500_000, 3e6, 100]
+    before, after = (written(tmp_path / f"{up}.gpkg", [curve + np.array([0.03, -0.02, 0.01]) * up]) for up in (0, 1))
+    result = rx.compare(before, after, reference_sigma=1, input_sigma=1, output=tmp_path / "out.gpkg")
+    figures = [result.figures[name] for name in ("SHIFT_EAST", "SHIFT_NORTH", "SHIFT_UP", "MOVED_LENGTH")]
+    np.testing.assert_allclose(figures, [30, -20, 10, 0], atol=0.2)
+    shift = "shifted by +30.0 mm east, -20.0 mm north, +10.0 mm up; apart from that, nothing has moved"
+    assert any(shift in sentence for sentence in result.sentences)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from rail_extract.core.learned.pyramid import build
+from rail_extract.core.learned.blocks import build
 
 torch = pytest.importorskip("torch")
 

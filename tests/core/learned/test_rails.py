@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from rail_extract.core.classify.settings import Settings
-from rail_extract.core.learned.rails import rails_of
+from rail_extract.core.learned.square import rails_of
 
 GAUGE, WIDTH = 1.435, 0.072
 SETTINGS = Settings((GAUGE,), WIDTH)

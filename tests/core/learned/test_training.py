@@ -5,7 +5,7 @@ import pytest
 from rail_extract.core.errors import Cancelled, ModelError, ParameterError
 from rail_extract.core.learned.examples import Examples, save_index, write_square
 from rail_extract.core.progress import Progress
-from rail_extract.laboratory.scenes.raw_shapes import flat, rough, with_bar, with_track
+from rail_extract.laboratory.scenes.raw_shapes import track_beside_kerb
 
 torch = pytest.importorskip("torch")
 
@@ -16,26 +16,16 @@ from rail_extract.core.learned.training import Figures, Settings, train  # noqa:
 SIDE = 40.0
 
 
-@pytest.fixture(autouse=True)
-def _small(monkeypatch):
-    """Make steps fast, also on computers that do other work: small operations wait for the slowest thread."""
-    monkeypatch.setattr(training, "BATCH", 2)
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)
-    yield
-    torch.set_num_threads(threads)
+pytestmark = pytest.mark.usefixtures("small_training")
 
 
 @pytest.fixture(scope="module")
 def examples(tmp_path_factory):
     """Blocks of 12 m of track and a kerb, in four areas."""
     folder = tmp_path_factory.mktemp("examples")
-    rng = np.random.RandomState(3)
-    xyz, on = with_track(flat(12.0, rng=rng, per_m2=200), 1.435, 0.072, 0.3)
-    xyz, kerb = with_bar(xyz, 0.5, 0.3, 3.0)
-    xyz = rough(xyz, rng)
+    xyz, on = track_beside_kerb(200)
     tile = (xyz[:, 0] > 20).astype(int)
-    save_index(folder, write_square(folder, 0, (0, 0), SIDE, xyz, on & ~kerb, tile))
+    save_index(folder, write_square(folder, 0, (0, 0), SIDE, xyz, on, tile))
     return Examples.load(folder)
 
 

@@ -17,9 +17,9 @@ from rail_extract.core.rails import RailLine, SearchFigures
 from rail_extract.core.raster import cell_size, rasterize
 from rail_extract.core.run.loop import Runner
 from rail_extract.core.squares import steps
-from rail_extract.core.squares.grid import MemorySource, SortedPoints
 from rail_extract.core.squares.steps import lines_of
 from rail_extract.core.standards import STANDARDS, RailStandard
+from rail_extract.core.tiles.grid import MemorySource, SortedPoints
 from rail_extract.core.tracks.centerlines import tracks_of
 from rail_extract.laboratory.curves import Element, trace, transition_curve
 from rail_extract.laboratory.scenes.plain import straight

@@ -8,7 +8,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from rail_extract.core.checks.findings import OFF_GAUGE, UNSUPPORTED, UNSURE, examine
+from rail_extract.core.checks.listing import HOLE, LONE_RAIL, OFF_RAIL_MM, list_findings, summary
 from rail_extract.core.frame import LocalFrame
+from rail_extract.core.progress import metres
 from rail_extract.core.rails import (
     Centerline,
     HeadWidths,
@@ -18,10 +21,8 @@ from rail_extract.core.rails import (
     StripCourse,
     TrackGeometry,
 )
-from rail_extract.core.report import build_page, list_findings, summary
-from rail_extract.core.report.findings import OFF_GAUGE, UNSUPPORTED, UNSURE, examine
-from rail_extract.core.report.listing import HOLE, LONE_RAIL, OFF_RAIL_MM
-from rail_extract.core.report.markup import metres, table, tag, text
+from rail_extract.core.report import build_page
+from rail_extract.core.report.markup import table, tag, text
 from rail_extract.core.report.page import ADVICE, CLASSES_ADVICE
 from rail_extract.core.report.plots import ticks
 
@@ -240,6 +241,28 @@ def test_the_page_needs_no_other_file_and_is_valid():
     for picture in pictures:
         assert "nan" not in ET.tostring(picture, encoding="unicode").lower()
     assert html.count("<section>") == html.count("</section>") == 7
+
+
+PAPER_PX = 703
+"""Width of A4 upright between its margins."""
+
+HIDDEN = """
+var most = 0, boxes = document.querySelectorAll(".scroll");
+for (var i = 0; i < boxes.length; i++) { most = Math.max(most, boxes[i].scrollWidth - boxes[i].clientWidth); }
+most;
+"""
+
+
+def test_pages_are_as_wide_as_the_window_and_paper_shows_every_column(in_browser):
+    html = page(track(sigma_mm=np.full(101, 9.0)), source="cloud.laz")
+    (width,) = in_browser(html, ["document.querySelector('section').offsetWidth"], 1900)
+    assert width > 1800
+    assert in_browser(html.replace("@media print", "@media screen"), [HIDDEN], PAPER_PX) == [0]
+
+
+def test_a_column_that_is_always_empty_is_left_out():
+    html = table(("Line", "Name", "Why"), [(1, "", "hidden"), (2, "", "")])
+    assert re.findall("<t[hd]>(.*?)</t[hd]>", html) == ["Line", "Why", "1", "hidden", "2", ""]
 
 
 def test_all_text_is_escaped():

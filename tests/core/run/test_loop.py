@@ -9,7 +9,7 @@ from rail_extract.core.errors import Cancelled
 from rail_extract.core.progress import Progress
 from rail_extract.core.run.loop import Runner
 from rail_extract.core.run.tasks import Once, Task
-from rail_extract.core.squares.grid import around
+from rail_extract.core.tiles.grid import around
 
 keys = st.sets(st.tuples(st.integers(-3, 3), st.integers(-3, 3)), min_size=1)
 

@@ -6,8 +6,8 @@ from rail_extract.core.clouds.points import RailPoints
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.rails import RailLine
 from rail_extract.core.run.loop import Runner
-from rail_extract.core.squares.grid import MemorySource
 from rail_extract.core.squares.remeasuring import measure_rails
+from rail_extract.core.tiles.grid import MemorySource
 
 WIDTH = 0.072
 LENGTH, TUNNEL = 300.0, (85.0, 215.0)

@@ -8,9 +8,9 @@ from rail_extract.core.frpdf.cleanup import clean
 from rail_extract.core.parameters import Parameters
 from rail_extract.core.pipeline import extract_rails
 from rail_extract.core.raster import TILE, cell_size, rasterize
-from rail_extract.core.squares.grid import MemorySource, lay_out, own_tiles
 from rail_extract.core.squares.steps import clean_square, engine_for, square_side
 from rail_extract.core.standards import STANDARDS
+from rail_extract.core.tiles.grid import MemorySource, lay_out, own_tiles
 
 STANDARD = STANDARDS["EN_60E1_1435"]
 

@@ -1,9 +1,12 @@
 """Worlds: a seed gives the same world, and the truth is where the scanner saw the heads."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from rail_extract.core.comparison.pieces import cut
 from rail_extract.laboratory.scenes.raw_world import HEAD
+from rail_extract.laboratory.worlds.classes import HEADS, classified, draw_classification
 from rail_extract.laboratory.worlds.railway import draw_railway
 from rail_extract.laboratory.worlds.world import make
 
@@ -58,3 +61,13 @@ def test_tracks_that_meet_have_rails_at_one_height():
             off = rail - feet
             meeting = np.hypot(off[:, 0], off[:, 1]) < 0.002
             assert np.all(np.abs(off[meeting, 2]) < 0.003), seed
+
+
+def test_from_above_a_class_holds_strips_that_are_wider_than_heads():
+    """Nobody sees the edges of heads in beams and images as wide as they are."""
+    world = make(SMALL[0], "raw")
+    how = replace(draw_classification(3), style=HEADS, strip_m=0.06, aside_m=0.01, missed=0.0, gaps=0, leaks=0.0)
+    scene = classified(world.scene, how, 3, from_above=True)
+    feet, _ = cut(world.scene.rails).nearest(scene.rail_points().xyz)
+    off_m = np.hypot(*(scene.rail_points().xyz - feet)[:, :2].T)
+    assert 0.045 < np.percentile(off_m, 98) < 0.075

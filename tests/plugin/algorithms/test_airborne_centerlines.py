@@ -64,42 +64,6 @@ def test_lines_stations_and_report_from_guides_in_degrees(flown, run_step, tmp_p
     stations = list(QgsVectorLayer(str(outputs["STATIONS"]), "stations").getFeatures())
     assert len(stations) == done.results["GUIDE_LENGTH"] / 10
     assert {station["seen"] for station in stations if station["reason"] == ""} == {1}
-    assert "Good" in (tmp_path / "report.html").read_text(encoding="utf-8")
-
-
-def test_guides_are_proposed_and_lead_to_lines(flown, run_step, tmp_path, new_feedback):
-    design, path = flown
-    feedback = new_feedback()
-    outputs = {name: tmp_path / f"{name}.gpkg" for name in ("CENTERLINES", "STATIONS", "PROPOSED")}
-    done = run_step("airbornecenterlines", {"INPUT": path, "FOOTPRINT": 0.25, **outputs}, feedback)
-    assert done.ok, done.error
-    assert not outputs["CENTERLINES"].exists()
-    proposed = QgsVectorLayer(str(outputs["PROPOSED"]), "proposed")
-    guides = list(proposed.getFeatures())
-    assert proposed.crs().authid() == CRS
-    length_m = sum(one["length_m"] for one in guides)
-    assert done.results["PROPOSED_LENGTH"] == pytest.approx(length_m, abs=0.002)  # each is rounded to 1 mm
-    assert [one["guide_id"] for one in guides] == [1, 2]
-    assert all(one["score"] > 80 for one in guides)
-    values = {"INPUT": path, "FOOTPRINT": 0.25, "GUIDE": proposed, "CENTERLINES": outputs["CENTERLINES"]}
-    assert run_step("airbornecenterlines", values).results["SEEN_LENGTH"] > 300
-    for line in QgsVectorLayer(str(outputs["CENTERLINES"]), "lines").getFeatures():
-        vertices = np.array([(v.x(), v.y()) for v in line.geometry().vertices()]) - ORIGIN[:2]
-        away = [
-            np.hypot(*(vertices[10:-10, None] - design.truth(number)[None, :, :2]).transpose(2, 0, 1)).min(axis=1)
-            for number in (0, 1)
-        ]
-        assert np.median(np.min(away, axis=0)) < 0.1
-
-
-def test_a_cloud_without_the_track_gives_no_line_but_reasons(flown, run_step, tmp_path):
-    design, path = flown
-    guide = guides(design.tracks[-1:], off_m=7.0)
-    outputs = {name: tmp_path / f"{name}.gpkg" for name in ("CENTERLINES", "STATIONS", "FINDINGS")}
-    done = run_step("airbornecenterlines", {"INPUT": path, "GUIDE": guide, "FOOTPRINT": 0.25, **outputs})
-    assert done.ok, done.error
-    assert done.results["CENTERLINE_COUNT"] == 0
-    assert done.results["SEEN_LENGTH"] < 30
-    reasons = [one["reason"] for one in QgsVectorLayer(str(outputs["FINDINGS"]), "findings").getFeatures()]
-    assert reasons
-    assert all(reasons)
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    for words in ("Good", 'aria-label="Map of the tracks"', "<dt>Date</dt>", f"<dd>{CRS} - "):
+        assert words in page

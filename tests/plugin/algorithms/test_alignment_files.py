@@ -1,16 +1,15 @@
 """Export Alignment and Import Alignment in QGIS: element tables, files, axes."""
 
-import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from memory_layers import layer_of
 from osgeo import ogr
-from qgis.core import NULL, QgsFeature, QgsProcessingUtils, QgsVectorLayer, QgsWkbTypes
+from qgis.core import QgsFeature, QgsProcessingUtils, QgsVectorLayer, QgsWkbTypes
 from rail_extract.core.alignment.elements import Alignment, CantElement, VerticalElement, chained
-from rail_extract.core.alignment.table import rows
 from rail_extract.core.fields import ELEMENT_FIELDS
+from rail_extract.core.files.table import rows
 from rail_extract.core.frame import LocalFrame
 from rail_extract.rail_extract_plugin.writing.layers import fields
 
@@ -118,27 +117,6 @@ def test_a_dialog_asks_for_no_output_that_needs_tracks(qgis, plugin):
     assert asked == ["ELEMENTS", "AXIS"]
 
 
-def test_tracks_are_compared_with_the_design_beside_them(exported, run_step, context, tmp_path):
-    _, path = exported("a.xml", table(design(), design(5)))
-    other, s = design(5), np.arange(12.0, 350.0, 4.0)
-    heading = other.headings(s)
-    xyz = FRAME.to_crs(
-        other.xyz(s) + np.column_stack([-np.sin(heading), np.cos(heading), np.full(len(s), 0.4)]) * 0.015
-    )
-    tracks = layer_of(xyz, crs="EPSG:25832", fields="&field=track_id:integer", values=[(9,)])
-    outputs = {"ELEMENTS": None, "AXIS": None, "DEVIATIONS": "memory:", "REPORT": tmp_path / "r.html"}
-    outcome = run_step("importalignment", {"INPUT": path, "TRACKS": tracks, **outputs})
-    assert outcome.ok, outcome.error
-    found = list(QgsProcessingUtils.mapLayerFromString(outcome.results["DEVIATIONS"], context).getFeatures())
-    assert [one["s"] for one in found] == list(range(12, 349))
-    assert {one["track_id"] for one in found} == {9}
-    assert [one["slew_mm"] for one in found] == pytest.approx([15.0] * len(found), abs=0.02)
-    assert [one["lift_mm"] for one in found] == pytest.approx([6.0] * len(found), abs=0.3)
-    assert {one["cant_diff_mm"] for one in found} == {NULL}
-    page = (tmp_path / "r.html").read_text(encoding="utf-8")
-    assert "<b>15.0 mm</b><span>slew, RMS" in page and "Track 5</h2>" in page and "is a proposal" not in page
-
-
 def test_the_cant_of_tracks_is_compared_with_that_of_the_design(exported, run_step, context):
     _, path = exported("a.xml")
     s = np.arange(20.0, 340.0, 2.0)
@@ -170,12 +148,3 @@ def test_gdal_reads_the_dxf(exported):
     points = next(one for one in features if one["Layer"] == "ALIGNMENT_4").GetGeometryRef().GetPoints()
     expected = FRAME.to_crs(design().xyz(np.array([0.0, 360.0])))
     np.testing.assert_allclose([points[0], points[-1]], expected, atol=1e-3)
-
-
-def test_ifc_states_the_system_and_gauge(exported):
-    outcome, path = exported("a.ifc", STANDARD="IN_75R_1000")
-    assert outcome.ok, outcome.error
-    text = path.read_text(encoding="ascii")
-    assert "IFCPROJECTEDCRS('EPSG:25832','ETRS89 / UTM zone 32N'" in text
-    assert re.search(r"IFCMAPCONVERSION\(#\d+,#\d+,578\d00\.0,5804\d00\.0,", text)
-    assert re.search(r"IFCALIGNMENTCANT\(.*,1\.06\d*\);", text)

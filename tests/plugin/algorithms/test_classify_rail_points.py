@@ -12,7 +12,6 @@ from qgis.core import (
     QgsGeometry,
     QgsPointXY,
     QgsProject,
-    QgsVectorLayer,
 )
 from rail_extract.laboratory.scenes.raw_shapes import MIDDLE, flat, rough, with_track
 
@@ -83,14 +82,6 @@ def test_a_folder_of_tiles_gives_a_folder_of_tiles_with_a_catalogue(raw, run_ste
     assert (laspy.read(tmp_path / "new" / "a.laz").classification == 10).sum() == done.results["RAIL_POINTS"] > 0
     again = run_step("classifyrailpoints", {"INPUT": tmp_path / "new.vpc", "OUTPUT": tmp_path / "second.vpc"})
     assert again.results["RAIL_POINTS"] == done.results["RAIL_POINTS"]
-
-
-def test_rails_are_extracted_from_the_raw_cloud(raw, run, tmp_path):
-    rails = tmp_path / "rails.gpkg"
-    done = run({"INPUT": raw[0], "CLASSIFY": True, "RAIL_CLASSES": "99", "ITERATIONS": 1, "RAILS": rails})
-    assert done.ok, done.error
-    assert done.results["RAIL_COUNT"] == 2
-    assert QgsVectorLayer(str(rails)).featureCount() == 2
 
 
 def test_the_standard_of_a_raw_cloud_is_detected(raw, run, new_feedback, tmp_path):

@@ -23,7 +23,6 @@ from qgis.core import (
 from rail_extract.core.kernels import blas
 from rail_extract.core.run import processes
 from rail_extract.core.scratch import PREFIX
-from rail_extract.rail_extract_plugin.reading.geotiff import read_header
 
 POINTS = f"{PREFIX}*/*/10_*"
 """Files with temporary points of class 10."""
@@ -166,53 +165,6 @@ def test_rails_of_two_classes_make_a_track_when_merged(run, new_feedback, write_
     assert (apart.results["CENTERLINE_COUNT"], merged.results["CENTERLINE_COUNT"]) == (0, 1)
     assert any("Rails of the classes 10, 11 form tracks" in text for text in feedback.warnings)
     assert {items["class_code"] for _, items in read_features(tmp_path / "rails.gpkg")} == {11}
-
-
-def test_cleaned_raster_equals_that_of_the_steps(run, run_step, scene, tmp_path):
-    raster, cleaned, whole = (tmp_path / name for name in ("raster.tif", "cleaned.tif", "whole.tif"))
-    assert run({**scene, "CLEANED": whole}).ok
-    assert run_step("rasterizerailpoints", {"INPUT": scene["INPUT"], "OUTPUT": raster}).ok
-    assert run_step("frpdfcleanup", {"INPUT": raster, "ITERATIONS": 1, "OUTPUT": cleaned}).ok
-    for path in (whole, cleaned):
-        assert read_header(path).class_codes == (10,)
-        assert gdal.Open(str(path)).GetMetadataItem("RAIL_HEAD_MM") == "72"
-    cells = [set(map(tuple, places_of(path).round(3))) for path in (whole, cleaned)]
-    assert len(cells[0]) > 500
-    assert cells[0] == cells[1]
-
-
-def places_of(path):
-    """Return the centres of the rail cells of a file in its coordinates, (n, 2)."""
-    dataset = gdal.Open(str(path))
-    x, side, _, y, _, _ = dataset.GetGeoTransform()
-    rows, columns = np.nonzero(dataset.ReadAsArray())
-    return np.column_stack([x + (columns + 0.5) * side, y - (rows + 0.5) * side])
-
-
-def test_findings_are_the_table_of_the_report(run, write_cloud, track, tmp_path):
-    """A gap in one rail, and points on the other that widen the gauge."""
-    points = track(length_m=30.0)
-    left = points[:, 1] > 3_000_000
-    along = points[:, 0] - 500_000
-    points[left & (along > 20), 1] += 0.02
-    gap = left & (along > 8) & (along < 11)
-    paths = {"FINDINGS": tmp_path / "findings.gpkg", "REPORT": tmp_path / "report.html"}
-    outcome = run({"INPUT": write_cloud(points[~gap]), "ITERATIONS": 1, **paths})
-    assert outcome.ok, outcome.error
-    layer, findings = lines_of(paths["FINDINGS"])
-    assert layer.crs().authid() == "EPSG:32643"
-    assert layer.wkbType() == 1002  # LineStringZ
-    assert [finding["finding"] for finding in findings] == [1, 2]
-    assert [finding["reason"] for finding in findings] == ["gauge off by more than 10 mm", "a rail has no points"]
-    wide, bare = findings
-    assert (wide["from_m"], wide["to_m"]) == pytest.approx((20, 30), abs=2)
-    assert wide["gauge_mm"] == pytest.approx(1455, abs=3)  # where it is widest
-    assert (bare["from_m"], bare["to_m"]) == pytest.approx((8, 11), abs=1)
-    assert bare.geometry().length() == pytest.approx(bare["to_m"] - bare["from_m"], abs=0.1)
-    table = re.findall("<tr>(.*?)</tr>", paths["REPORT"].read_text(encoding="utf-8").split("Where to look")[1])[1:3]
-    for row, finding in zip(table, findings):
-        assert f"{finding['from_m']} to {finding['to_m']} m" in row
-        assert finding["reason"] in row
 
 
 def test_strips_are_stated_and_aligned(run, write_cloud, track, tmp_path, new_feedback):

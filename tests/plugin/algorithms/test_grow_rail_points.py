@@ -70,23 +70,6 @@ def test_one_rail_grows_from_a_place_on_the_map(raw, run_step):
     assert done.results["SINGLE_LENGTH"] == pytest.approx(13.5, abs=1)
 
 
-def test_the_rails_of_seeds_become_lines_in_one_call(raw, run_step, run, tmp_path):
-    seeds = layer_of(QgsGeometry.fromPointXY(place(7.0, SPACING_M / 2)), kind="Point")
-    one, two = tmp_path / "one.gpkg", tmp_path / "two.gpkg"
-    done = run({"INPUT": raw, "SEEDS": seeds, "RAIL_CLASSES": "99", "ITERATIONS": 1, "RAILS": one})
-    assert done.ok, done.error
-    assert done.results["RAIL_COUNT"] == 2
-    grown = run_step("growrailpoints", {"INPUT": raw, "SEEDS": seeds, "OUTPUT": tmp_path / "new.laz"})
-    assert run({"INPUT": tmp_path / "new.laz", "ITERATIONS": 1, "RAILS": two}).ok, grown.error
-    lines = [
-        [feature.geometry() for feature in QgsVectorLayer(str(path), "rails", "ogr").getFeatures()]
-        for path in (one, two)
-    ]
-    assert len(lines[0]) == len(lines[1]) == 2
-    for line, other in zip(*lines):
-        assert line.hausdorffDistance(other) < 0.001
-
-
 def test_a_line_along_a_rail_is_a_row_of_seeds(raw, run_step, tmp_path):
     line = QgsGeometry.fromPolylineXY([place(2.0, SPACING_M / 2), place(12.0, SPACING_M / 2)])
     values = {"INPUT": raw, "SEEDS": layer_of(line, kind="LineString"), "MAX_LENGTH": 2, "OUTPUT": tmp_path / "n.las"}

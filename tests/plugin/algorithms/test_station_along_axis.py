@@ -75,43 +75,12 @@ def test_points_get_kilometre_offset_and_side_and_keep_their_fields(station):
     assert warnings == []
 
 
-@pytest.mark.parametrize(
-    ("notation", "text"),
-    [("HECTOMETRES", "12.2+50.50"), ("KILOMETRES", "12+250.50"), ("GERMAN", "12,2 + 50"), ("MILES", "7 mi 1077.31 yd")],
-)
-def test_formats(station, notation, text):
-    _, values, _ = station(layer("Point", PLACES[1]), layer("LineStringM", AXIS_M), FORMAT=notation)
-    assert values["km_text"] == [text]
-
-
-def test_start_and_direction(station):
-    places, axis = layer("Point", *PLACES), layer("LineString", AXIS)
-    _, values, _ = station(places, axis, START_KM=5.0)
-    assert values["km"] == [5.1, 5.2505, 5.999]
-    _, values, _ = station(places, axis, START_KM=5.0, DIRECTION="DECREASING")
-    assert values["km"] == [4.9, 4.7495, 4.001]
-    assert values["offset_m"] == [-4.0, 2.5, 0.0]
-
-
 def test_posts_with_texts_and_a_field_of_their_own(station):
     posts = layer(
         "Point", "POINT(0 3)", "POINT(500 -3)", fields="&field=board:string(9)", values=[("7,5 + 0",), ("8.0",)]
     )
     _, values, _ = station(layer("Point", *PLACES), layer("LineString", AXIS), POSTS=posts, POST_FIELD="board")
     assert values["km"] == [7.6, 7.7505, 8.499]
-
-
-def test_jumps_with_a_gap_and_an_overlap(station):
-    places = layer("Point", "POINT(150 0)", "POINT(350 0)", "POINT(650 0)")
-    fields = "&field=km_back:double&field=km_ahead:double"
-    jumps = layer_of(kind="None", fields=fields, values=[(2.2, 2.3), (2.6, 2.45)])
-    _, values, _ = station(places, layer("LineString", AXIS), START_KM=2.0, JUMPS=jumps, FORMAT="GERMAN")
-    assert values["km"] == [2.15, 2.45, 2.6]
-    assert values["piece"] == [1, 2, 3]
-    assert values["km_text"] == ["2,1 + 50", "2,4 + 50", "2,6 + 0"]
-    places = layer("Point", "POINT(480 0)")
-    _, values, _ = station(places, layer("LineString", AXIS), START_KM=2.0, JUMPS=jumps, FORMAT="GERMAN")
-    assert values["km_text"] == ["2,4 + 180"]  # counts on from 2,4 because 2,45 comes again
 
 
 @pytest.mark.parametrize("crs", ["EPSG:4326", "EPSG:32644"])
@@ -121,23 +90,6 @@ def test_an_axis_in_another_system_is_transformed_and_that_is_said(station, crs)
     np.testing.assert_allclose(values["km"], [12.1, 12.2505, 12.999], atol=2e-6)
     np.testing.assert_allclose(values["offset_m"], [4.0, -2.5, 0.0], atol=0.02)
     assert (warnings == [f"AXIS is in {crs} and was transformed to EPSG:32643."]) == (crs == "EPSG:4326")
-
-
-def test_lines_and_polygons_get_the_kilometres_of_their_ends(station):
-    axis = layer("LineStringM", AXIS_M)
-    _, values, _ = station(layer("LineString", "LINESTRING(100 4, 300 6)"), axis)
-    assert (values["km"], values["km_from"], values["km_to"]) == ([12.2], [12.1], [12.3])
-    _, values, _ = station(layer("Polygon", "POLYGON((100 4, 300 4, 300 9, 100 9, 100 4))"), axis)
-    assert (values["km_from"], values["km_to"], values["side"]) == ([12.1], [12.3], ["left"])
-
-
-def test_what_has_no_kilometre_stays_and_is_counted(station):
-    places = layer("Point", PLACES[0], "POINT(1005 2)", None)
-    results, values, warnings = station(places, layer("LineStringM", AXIS_M))
-    assert values["km"] == [12.1, None, None]
-    assert values["axis"] == ["1", None, None]
-    assert (results["PLACE_COUNT"], results["BEYOND_COUNT"]) == (1, 2)
-    assert warnings == ["1 of 2 places are beyond the ends of AXIS: their kilometres are empty."]
 
 
 def test_on_a_ring_kilometres_run_once_round_and_either_end_is_meant_where_it_closes(station):
@@ -153,19 +105,6 @@ def test_fields_of_the_same_name_stay(station):
     places = layer("Point", PLACES[0], fields="&field=km:double", values=[(99.0,)])
     _, values, _ = station(places, layer("LineStringM", AXIS_M))
     assert (values["km"], values["km_2"]) == ([99.0], [12.1])
-
-
-def test_axes_have_the_names_of_their_field(station):
-    axes = layer(
-        "LineStringM",
-        AXIS_M,
-        "LINESTRING M(0 300 5000, 1000 300 6000)",
-        fields="&field=name:string(9)",
-        values=[("1700",), ("1701",)],
-    )
-    _, values, _ = station(layer("Point", "POINT(100 4)", "POINT(100 296)"), axes)
-    assert values["axis"] == ["1700", "1701"]
-    assert values["km"] == [12.1, 5.1]
 
 
 @pytest.mark.parametrize("name", ["stations.csv", "Größe 1.gpkg"])

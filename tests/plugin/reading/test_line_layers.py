@@ -5,8 +5,10 @@ import math
 import numpy as np
 import pytest
 from memory_layers import layer_of
+from qgis.core import QgsGeometry, QgsLineString, QgsProcessingContext
+from rail_extract.core.jobs.features import read_lines
 from rail_extract.core.progress import SILENT
-from rail_extract.rail_extract_plugin.reading.line_layers import read_lines
+from rail_extract.rail_extract_plugin.reading.layers import LayerSource
 
 LEFT = "LINESTRING Z (500000 3000001.507 100, 500020 3000001.507 100)"
 RIGHT = "LINESTRING Z (500020 3000000 100.02, 500000 3000000 100.02)"
@@ -28,6 +30,9 @@ class Source:
     def sourceCrs(self):
         return self._layer.crs()
 
+    def wkbType(self):
+        return self._layer.wkbType()
+
     def getFeatures(self, request, flags):
         return self._layer.getFeatures(request)
 
@@ -39,7 +44,7 @@ class Source:
 
 
 def rails_of(layer):
-    lines = read_lines(Source(layer))
+    lines = read_lines(LayerSource("INPUT", Source(layer), QgsProcessingContext()), SILENT)
     return lines.rails(SILENT), lines.frame
 
 
@@ -144,3 +149,8 @@ def test_three_rails_make_two_tracks_in_one_run(layer, run_step, context):
     tracks = context.getMapLayer(outcome.results["OUTPUT"]).getFeatures()
     found = [(track["left_ids"], track["right_ids"], round(track["gauge_mm"])) for track in tracks]
     assert found == [("3", "1", 1435), ("2", "1", 1000)]
+
+
+def test_empty_lines_are_left_out(layer):
+    rails, _ = rails_of(layer(LEFT, QgsGeometry(QgsLineString()), RIGHT))
+    assert [len(rail.xyz) for rail in rails] == [2, 2]

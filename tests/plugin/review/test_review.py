@@ -65,7 +65,11 @@ def section(start, end, **values):
     return line, {"reason": "a rail has no points", "track_id": 1, "from_m": start, "to_m": end, **values}
 
 
-ROWS = [section(8.0, 10.0, finding=2, worst_m=9.0, gauge_mm=1440.0), section(2.0, 4.0, finding=1, worst_m=3.0)]
+ERRORS = {"sigma_mm": 4.9, "sigmaz_mm": 10.7}
+ROWS = [
+    section(8.0, 10.0, finding=2, worst_m=9.0, gauge_mm=1440.0, **ERRORS),
+    section(2.0, 4.0, finding=1, worst_m=3.0),
+]
 
 
 @pytest.fixture
@@ -101,7 +105,8 @@ def test_findings_come_in_their_order_with_words_and_figures(load, dock):
     assert shown.text.text().startswith("Track 1, 2.0 to 4.0 m")
     assert not shown.buttons["previous"].isEnabled()
     shown.buttons["next"].click()
-    assert shown.text.text() == "Track 1, 8.0 to 10.0 m: gauge 1440.0 mm. Cross-section at 9.0 m."
+    figures = "gauge 1440.0 mm, standard error 4.9 mm across, 10.7 mm in height"
+    assert shown.text.text() == f"Track 1, 8.0 to 10.0 m: {figures}. Cross-section at 9.0 m."
     assert not shown.buttons["next"].isEnabled()
 
 

@@ -6,6 +6,7 @@ import platform
 import re
 import sys
 import zipfile
+from itertools import product
 from pathlib import Path
 
 import pytest
@@ -52,8 +53,8 @@ def folder(tmp_path):
 def put(folder):
     """Install a package by its name, which is also the name of its module."""
 
-    def put(name: str, progress: Progress = SILENT) -> str:
-        return install(Order((name,), (name,)), find_interpreter(), folder, [folder], progress)
+    def put(name: str, progress: Progress = SILENT, *options: str) -> str:
+        return install(Order((name,), (name,), options), find_interpreter(), folder, [folder], progress)
 
     return put
 
@@ -197,7 +198,7 @@ def test_files_of_the_list_are_downloaded_once(put, add_wheel, monkeypatch, tmp_
 
 def test_the_list_has_what_every_requirement_brings():
     listed = {package.name for package, _ in locked._listed()}
-    assert {name for names in locked.BROUGHT.values() for name in names} == listed - {"pip"}
+    assert {name for names in locked.BROUGHT.values() for name in names} | {"pip"} <= listed
     assert set(locked.BROUGHT) == {one.requirement for one in PACKAGES if one.module not in (*OWNED_BY_QGIS, *OPTIONAL)}
 
 
@@ -209,6 +210,20 @@ def test_the_locked_version_is_installed(put, add_wheel, monkeypatch, tmp_path):
         Locked("railfirst", "1.1", (checksum(tmp_path, "railfirst"), checksum(tmp_path, "railfirst", "1.1"))),
     )
     assert put("railfirst") == "railfirst 1.1"
+
+
+def test_an_index_of_its_own_has_other_files_than_the_list(put, add_wheel, monkeypatch, tmp_path):
+    class Listener(Progress):
+        def info(self, text):
+            infos.append(text)
+
+    infos = []
+    for version in ("1.0", "2.0"):
+        add_wheel("railfirst", version)
+    lock(monkeypatch, Locked("railfirst", "1.0", (checksum(tmp_path, "railfirst"),)))
+    own = tmp_path / "index"
+    assert put("railfirst", Listener(), "--find-links", str(own)) == "railfirst 2.0"
+    assert f"The files of railfirst come from an index of their own, {own}: they are compared with its" in infos[0]
 
 
 def test_a_file_with_another_checksum_is_refused(put, add_wheel, monkeypatch, tmp_path, folder):
@@ -224,10 +239,13 @@ def test_the_list_covers_every_package_and_python():
     """If this fails, run tools/lock.py."""
     needed = {package.requirement.partition("[")[0] for package in PACKAGES if package.module not in OPTIONAL}
     listed = list(locked._listed())
-    for python in ("3.9", "3.10", "3.11", "3.12", "3.13", "3.14"):
-        names = [package.name for package, pythons in listed if python in pythons]
+    without_torch = set()
+    for python, system in product(("3.9", "3.10", "3.11", "3.12", "3.13", "3.14"), locked.SYSTEMS):
+        names = [package.name for package, places in listed if {python, f"{python}:{system}"} & set(places)]
         assert len(names) == len(set(names))
         assert needed - set(OWNED_BY_QGIS) | {"lazrs", "pip"} <= set(names)
+        without_torch |= set() if "torch" in names else {(python, system)}
+    assert without_torch == {(python, "darwin-x86_64") for python in ("3.13", "3.14")}
     for package, _ in listed:
         assert package.name == installation.normalized(package.name)
         assert all(re.fullmatch("sha256:[0-9a-f]{64}", one) for one in package.checksums)

@@ -8,8 +8,8 @@ from qgis.core import (
     QgsWkbTypes,
 )
 from rail_extract.core.fields import CENTERLINE_FIELDS, CENTERLINES, QUALITY_FIELDS, RAIL_FIELDS, RAILS
+from rail_extract.core.files.layers import lines_layer
 from rail_extract.core.frame import LocalFrame
-from rail_extract.core.output.layers import lines_layer
 from rail_extract.core.rails import Centerline, RailLine
 from rail_extract.rail_extract_plugin.writing.destinations import destinations
 from rail_extract.rail_extract_plugin.writing.layers import add_features, features, fields, output_crs

@@ -34,7 +34,7 @@ from rail_extract.rail_extract_plugin.writing.run import RUN, SOURCE, TOOL, new_
 from rail_extract.rail_extract_plugin.writing.styling import style_on_load
 
 SHAPES = {
-    **dict.fromkeys(("rails", "centerlines", "findings", "elements", "airborne", "proposed", "places"), "LineStringZ"),
+    **dict.fromkeys(("rails", "centerlines", "findings", "elements", "airborne", "places"), "LineStringZ"),
     **dict.fromkeys(("quality", "stops", "differences", "deviations", "stations"), "PointZ"),
     "axes": "LineStringZM",
 }
@@ -52,7 +52,6 @@ DRAWN = {
     "axes": ({"track_id": 1}, "#8e5bb5"),
     "deviations": ({"track_id": 1, "slew_mm": 12.0}, "#b2182b"),
     "airborne": ({"track_id": 1}, "#e64a19"),
-    "proposed": ({"guide_id": 1, "score": 90.0}, "#8e24aa"),
     "stations": ({"track_id": 1, "seen": 1}, "#2e7d4f"),
 }
 """A row of each style, and a colour in which it is drawn."""

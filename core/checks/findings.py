@@ -1,0 +1,338 @@
+"""Findings of the report: how much of the tracks is in doubt, why, and where."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..polyline import Polyline
+from ..rails import STRIP_OFF_M, Centerline, HeadWidths, RailLine, RailNetwork, TrackGeometry, cell_borders
+from .doubts import find_jumps
+
+GAUGE_OFF_MM = 10.0
+"""Plain track is not left in service with a larger deviation from its gauge. Curves of less than 200 m radius are
+widened by more, and deserve a look."""
+
+GAUGE_SIGMAS = 4.0
+"""Standard errors of the centerline by which a gauge must be off to count: two of the gauge's own, which is twice that
+of a line midway between two rails whose errors are independent."""
+
+UNSURE_MM = 5.0
+"""A track survey does not accept larger standard errors of a centerline."""
+
+MERGE_M = 5.0
+"""Doubtful places closer than this along the track count as one."""
+
+SILENT_SHARE = 0.02
+"""Share of the length in doubt for a reason that the stations of tracks do not show, above which a result is not good
+throughout."""
+
+MAX_HOLE_M = 200.0
+"""Longest section without any rail across which two tracks are recognized as one: longer ones may hide a switch."""
+
+END_M = 20.0
+"""Length of the end of a track that shows its direction."""
+
+HOLE_RADIUS_M, HOLE_MISS_DEG = 150.0, 1.5
+"""Smallest radius of a curve in a hole, and largest angle by which its chord may differ from the mean direction of the
+two tracks, which it equals on an arc."""
+
+FEW, MANY = 0.05, 0.25
+"""Share of the length in doubt up to which a result is good with a few exceptions, and above which it is poor."""
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """A reason to look at a place.
+
+    Attributes
+    ----------
+    name : str
+        CSS class of its marks in the pictures.
+    label : str
+        The reason in words, for lists.
+    """
+
+    name: str
+    label: str
+
+
+UNSUPPORTED = Doubt("unsupported", "a rail has no points")
+OFF_GAUGE = Doubt("offgauge", f"gauge off by more than {GAUGE_OFF_MM:g} mm and {GAUGE_SIGMAS:g} standard errors")
+UNSURE = Doubt("unsure", f"standard error above {UNSURE_MM:g} mm across or in height")
+DOUBTS = (UNSUPPORTED, OFF_GAUGE, UNSURE)
+"""In order of severity; a place counts under the first that applies."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """A section of a track to look at.
+
+    Attributes
+    ----------
+    start_m, end_m : float
+        Chainages.
+    length_m : float
+        Length in doubt within the section.
+    """
+
+    track_id: int
+    doubt: Doubt
+    start_m: float
+    end_m: float
+    length_m: float
+
+
+@dataclass(frozen=True)
+class TrackFindings:
+    """The findings on one track.
+
+    Attributes
+    ----------
+    nominal_mm : float
+        Nearest of the gauges that tracks may have.
+    doubtful : dict of Doubt to (n,) bool array
+        Stations in doubt, by reason; a station has at most one.
+    steps : tuple of tuple of float
+        Chainage and size in metres of its steps to the side.
+    """
+
+    line: Centerline
+    geometry: TrackGeometry
+    nominal_mm: float
+    doubtful: dict[Doubt, np.ndarray]
+    steps: tuple[tuple[float, float], ...] = ()
+
+    @property
+    def length_m(self) -> float:
+        """Plan length."""
+        return float(self.geometry.cells_m.sum())
+
+    @property
+    def strips_apart_m(self) -> float:
+        """Plan length on which strips differ by as much as the user is warned of."""
+        apart = np.nan_to_num(self.geometry.strip_mm) >= 1000 * STRIP_OFF_M
+        return float(self.geometry.cells_m[apart].sum())
+
+    def length_of(self, doubt: Doubt) -> float:
+        """Return the length in doubt for a reason."""
+        return float(self.geometry.cells_m[self.doubtful[doubt]].sum())
+
+    def places(self, doubt: Doubt, merge_m: float = MERGE_M) -> list[Place]:
+        """Return the places in doubt for a reason; those no more than `merge_m` apart are merged."""
+        return list(_places(self.geometry, doubt, self.doubtful[doubt], merge_m))
+
+
+@dataclass(frozen=True)
+class Hole:
+    """A section without rails between two tracks that are likely one.
+
+    Attributes
+    ----------
+    first, second : int
+        Numbers of the tracks.
+    ends : (2, 3) array
+        Ends of the tracks, local metres.
+    """
+
+    first: int
+    second: int
+    length_m: float
+    ends: np.ndarray
+
+
+@dataclass(frozen=True)
+class Findings:
+    """The findings on all tracks, and on what the stations of tracks do not show.
+
+    Attributes
+    ----------
+    lonely : tuple of RailLine
+        Rails that belong to no track.
+    rails_m : float
+        Length of all rails.
+    heads : HeadWidths or None
+        Width of the heads; only if another one is stated.
+    stepped_m : float
+        Plan length of the tracks that step to the side: on one side of a step, all of it is off.
+    """
+
+    tracks: tuple[TrackFindings, ...]
+    lonely: tuple[RailLine, ...] = ()
+    rails_m: float = 0.0
+    holes: tuple[Hole, ...] = ()
+    heads: HeadWidths | None = None
+    stepped_m: float = 0.0
+
+    @property
+    def lonely_m(self) -> float:
+        """Length of the rails that belong to no track."""
+        return float(sum(rail.length_m for rail in self.lonely))
+
+    @property
+    def silent_share(self) -> float:
+        """Share of the length that is in doubt although every station of the tracks is good."""
+        if self.heads is not None:
+            return 1.0
+        hole_m = sum(hole.length_m for hole in self.holes)
+        lonely = self.lonely_m / self.rails_m if self.rails_m else 0.0
+        off_m = max(self.stepped_m, sum(track.strips_apart_m for track in self.tracks))
+        off = off_m / self.length_m if off_m else 0.0
+        return max(lonely, off, hole_m / (self.length_m + hole_m) if hole_m else 0.0)
+
+    @property
+    def length_m(self) -> float:
+        """Plan length of all tracks."""
+        return sum(track.length_m for track in self.tracks)
+
+    def length_of(self, doubt: Doubt) -> float:
+        """Return the length of all tracks in doubt for a reason."""
+        return sum(track.length_of(doubt) for track in self.tracks)
+
+    @property
+    def share(self) -> float:
+        """Share of the length that is in doubt for any reason."""
+        return sum(self.length_of(doubt) for doubt in DOUBTS) / self.length_m if self.tracks else 1.0
+
+    def places(self) -> list[Place]:
+        """Return all places to look at, in order of decreasing length in doubt."""
+        found = [place for track in self.tracks for doubt in DOUBTS for place in track.places(doubt)]
+        return sorted(found, key=lambda place: -place.length_m)
+
+
+def examine(network: RailNetwork, gauges_m: Sequence[float]) -> Findings:
+    """Find where the tracks of a network are in doubt.
+
+    Parameters
+    ----------
+    network : RailNetwork
+        With the geometry of its tracks, in any order.
+    gauges_m : sequence of float
+        Gauges that tracks may have.
+    """
+    geometry = {track.track_id: track for track in network.geometry}
+    tracks = tuple(
+        _examine_track(line, geometry[line.track_id], gauges_m, find_jumps(line, network.rails))
+        for line in network.centerlines
+    )
+    heads = network.heads
+    return Findings(
+        tracks,
+        _lonely(network),
+        float(sum(rail.length_m for rail in network.rails)),
+        tuple(_holes(network.centerlines)),
+        heads if heads is not None and heads.differ else None,
+        sum(track.length_m for track in tracks if track.steps),
+    )
+
+
+def _lonely(network: RailNetwork) -> tuple[RailLine, ...]:
+    """Return the rails that belong to no track; none if a track does not name its rails, as one drawn by hand."""
+    named = [(*line.left_ids, *line.right_ids) for line in network.centerlines]
+    if not all(named):
+        return ()
+    paired = {rail_id for ids in named for rail_id in ids}
+    return tuple(rail for rail in network.rails if rail.rail_id not in paired)
+
+
+def _holes(lines: Sequence[Centerline]) -> Iterator[Hole]:
+    """Find ends of tracks that lead to each other on an arc, the nearest first; each end leads to one other."""
+    ends = [
+        (number, end[0], _outward(end))
+        for number, line in enumerate(lines)
+        for end in (line.xyz, line.xyz[::-1])
+        if not _is_met(end[0, :2], number, lines)
+    ]
+    found = []
+    for one, (first, place, outward) in enumerate(ends):
+        for other, (second, target, back) in enumerate(ends[:one]):
+            way = (target - place)[:2]
+            length_m = float(np.hypot(*way))
+            if first == second or not 0 < length_m <= MAX_HOLE_M:
+                continue
+            leaving, arriving = _angle(outward, way), _angle(way, -back)
+            bend = length_m / HOLE_RADIUS_M
+            if abs(leaving - arriving) / 2 <= np.radians(HOLE_MISS_DEG) and abs(leaving + arriving) <= bend:
+                found.append((length_m, one, other))
+    used: set[int] = set()
+    for length_m, one, other in sorted(found):
+        if one not in used and other not in used:
+            used |= {one, other}
+            met = sorted((lines[ends[end][0]].track_id, end) for end in (one, other))
+            (first, _), (second, _) = met
+            yield Hole(first, second, length_m, np.stack([ends[end][1] for _, end in met]))
+
+
+def _outward(end: np.ndarray) -> np.ndarray:
+    """Return the unit vector out of a line at its first vertex, from the vertices, (n, 3), within `END_M` of it.
+
+    An arc through the end, the middle and the last of them gives the direction at the end itself.
+    """
+    line = Polyline(end[:, :2])
+    reach_m = min(END_M, line.length_m)
+    near, far = line.at(np.array([reach_m / 2, reach_m]))
+    outward = 3 * end[0, :2] - 4 * near + far
+    return outward / np.hypot(*outward)
+
+
+def _angle(one: np.ndarray, other: np.ndarray) -> float:
+    """Return the angle from one direction to another, radians, positive to the left."""
+    return float(np.arctan2(one[0] * other[1] - one[1] * other[0], one @ other))
+
+
+def _is_met(place: np.ndarray, number: int, lines: Sequence[Centerline]) -> bool:
+    """Return whether another track passes an end of track `number` or begins there."""
+    return any(len(line.line.feet(place[None], 1.0).t) > 0 for other, line in enumerate(lines) if other != number)
+
+
+def _examine_track(
+    line: Centerline, geometry: TrackGeometry, gauges_m: Sequence[float], steps: Sequence[tuple[float, float]]
+) -> TrackFindings:
+    nominal_mm = min((1000 * gauge_m for gauge_m in gauges_m), key=lambda gauge: abs(gauge - line.gauge_mm))
+    with np.errstate(invalid="ignore"):
+        unsupported = geometry.bridged | np.isnan(geometry.gauge_mm)
+        off = ~unsupported & (gauge_off(geometry, nominal_mm) > GAUGE_OFF_MM)
+        unsure = ~unsupported & ~off & (np.fmax(geometry.sigma_mm, geometry.sigmaz_mm) > UNSURE_MM)
+    doubtful = {UNSUPPORTED: unsupported, OFF_GAUGE: off, UNSURE: unsure}
+    return TrackFindings(line, geometry, nominal_mm, doubtful, tuple(steps))
+
+
+def gauge_off(geometry: TrackGeometry, nominal_mm: float) -> np.ndarray:
+    """Return the deviations from a gauge at the stations, (n,) mm: 0 where they may be errors, NaN where unknown."""
+    off_mm = np.abs(geometry.gauge_mm - nominal_mm)
+    return np.where(off_mm <= GAUGE_SIGMAS * geometry.sigma_mm, 0.0, off_mm)
+
+
+def _places(geometry: TrackGeometry, doubt: Doubt, doubtful: np.ndarray, merge_m: float) -> Iterator[Place]:
+    """Join stations in doubt into places."""
+    numbers = np.flatnonzero(doubtful)
+    if not len(numbers):
+        return
+    borders = cell_borders(geometry.chainage_m)
+    starts, ends = borders[numbers], borders[numbers + 1]
+    apart = np.flatnonzero(starts[1:] - ends[:-1] > merge_m) + 1
+    for mine in np.split(np.arange(len(numbers)), apart):
+        length_m = geometry.cells_m[numbers[mine]].sum()
+        yield Place(geometry.track_id, doubt, float(starts[mine[0]]), float(ends[mine[-1]]), float(length_m))
+
+
+def known(values: np.ndarray) -> np.ndarray:
+    """Return the values that are numbers, (k,)."""
+    return values[np.isfinite(values)]
+
+
+def median(values: np.ndarray) -> float:
+    """Return the median of the known values; NaN without any."""
+    return float(np.median(known(values))) if known(values).size else np.nan
+
+
+def rms(values: np.ndarray) -> float:
+    """Return the root mean square of the known values; NaN without any."""
+    return float(np.sqrt(np.mean(known(values) ** 2))) if known(values).size else np.nan
+
+
+def largest(values: np.ndarray) -> float:
+    """Return the known value that is furthest from 0, with its sign; NaN without any."""
+    return float(max(known(values).tolist(), key=abs, default=np.nan))

@@ -1,0 +1,295 @@
+"""What jobs read from vector layers, checked in one place: lines, guides, seeds, masks, axes and tables.
+
+QGIS reads layers itself, the command line and Python with pyogrio and shapely; both provide a `Source`.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Collection, Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..airborne.survey import Guide, gauge_of
+from ..clouds.crs import parse_crs, title_of, unit_in_plan
+from ..clouds.mask import Mask
+from ..design_places import check_line, check_places
+from ..errors import CrsError, MissingError, ParameterError, RailExtractError
+from ..kilometres.axes import (
+    AHEAD,
+    BACK,
+    NAME_FIELDS,
+    Axes,
+    AxisLine,
+    PlacedAxes,
+    Post,
+    Start,
+    check_jumps,
+    km_of,
+    make_axes,
+    post_field,
+)
+from ..kilometres.stationing import Jump
+from ..progress import Progress
+from .declaration import LINE, POINT, POLYGON
+from .lines import Lines, Row, system_of, without_steps
+from .shared import DECREASING
+
+if TYPE_CHECKING:
+    from .values import Rows, Values
+
+
+@dataclass(frozen=True)
+class Feature:
+    """A feature of a layer.
+
+    Attributes
+    ----------
+    row : mapping
+        Values by the name of the field, None where one is empty.
+    bounds : (k, 2) array
+        Smallest and largest coordinates, in the coordinate system of the layer; none without a geometry.
+    parts : sequence of (str, (n, 4) array)
+        Kind, and x, y, z and M in the coordinate system that was asked for, of each point, each line and the outer ring
+        of each polygon; NaN where there is no z or M. Curves are chords.
+    is_lost : bool
+        Whether it has no place in that coordinate system.
+    middle : callable
+        Returns where it counts, (2,): half way along a line, inside a polygon, in the mean of points.
+    """
+
+    number: int
+    row: Row
+    bounds: np.ndarray
+    parts: Sequence[tuple[str, np.ndarray]]
+    is_lost: bool
+    middle: Callable[[], np.ndarray]
+
+    def of_kind(self, kind: str) -> Iterator[np.ndarray]:
+        """Yield the vertices of the parts of a kind, (n, 4)."""
+        return (vertices for one, vertices in self.parts if one == kind)
+
+
+class Source(ABC):
+    """A vector layer or a table.
+
+    Attributes
+    ----------
+    name : str
+        Of the parameter that was given it, for messages.
+    count : int
+        Number of features.
+    kinds : collection of str
+        Kinds of the geometries that it may have; none for a table.
+    notices : sequence of str
+        What the user is told of the fields where the features are copied.
+    """
+
+    name: str
+    crs_wkt: str | None
+    fields: Sequence[str]
+    count: int
+    kinds: Collection[str]
+    notices: Sequence[str] = ()
+
+    @abstractmethod
+    def rows(self) -> Iterator[tuple[int, Row]]:
+        """Yield number and values of each feature; see `Feature`."""
+
+    @abstractmethod
+    def features(self, crs_wkt: str | None) -> Iterator[Feature]:
+        """Yield the features in a coordinate system; as they are if it or that of the layer is unknown."""
+
+    @abstractmethod
+    def rings(self, crs_wkt: str | None) -> list[np.ndarray]:
+        """Return the closed rings, (k, 2) each, of the polygons and of their holes; overlaps count once."""
+
+    def where(self, number: int) -> str:
+        """Return how a message names a feature."""
+        return f"{self.name} (feature {number})"
+
+
+def read_lines(source: Source, progress: Progress) -> Lines:
+    """Read all parts of all lines that have a length, in one local frame.
+
+    Raises
+    ------
+    RailExtractError
+        The lines are in degrees, there is none, or one has an impossible vertex.
+    """
+    system = system_of(source.crs_wkt, progress)
+    parts = (
+        (feature.number, feature.row, moving)
+        for feature in progress.follow(source.features(source.crs_wkt), source.count)
+        for moving in map(_moving, feature.of_kind(LINE))
+        if len(moving) > 1
+    )
+    return Lines.of(source.name, parts, source.fields, system, progress)
+
+
+def read_rows(source: Source, progress: Progress) -> Rows:
+    """Read the values of all features, and the names of their fields."""
+    return [row for _, row in progress.follow(source.rows(), source.count)], source.fields
+
+
+def read_lines_along(source: Source, crs_wkt: str | None) -> list[np.ndarray]:
+    """Read lines that show places along tracks, (k, 2) each, in a coordinate system.
+
+    Raises
+    ------
+    RailExtractError
+        There is none, one leads to a place that is not on the map, or they can't be transformed.
+    """
+    lines = [line for _, line in _lines_along(source, _placed(source, crs_wkt), crs_wkt)]
+    if not lines:
+        raise MissingError(source.name, "line")
+    return lines
+
+
+def read_guides(source: Source, crs_wkt: str | None) -> list[Guide]:
+    """Read such lines with the name, reference and gauge of the track along each; see `read_lines_along`."""
+    features = _placed(source, crs_wkt)
+    if any(kind == POLYGON for feature in features for kind, _ in feature.parts):
+        raise ParameterError(f"{source.name} has polygons: give lines along the tracks, one for each.")
+    guides = [
+        Guide(
+            feature.number,
+            line,
+            gauge_of(feature.row.get("gauge")),
+            *(str(feature.row.get(name) or "") for name in ("name", "ref")),
+        )
+        for feature, line in _lines_along(source, features, crs_wkt)
+    ]
+    if not guides:
+        raise MissingError(source.name, "line")
+    return guides
+
+
+def read_seeds(source: Source, crs_wkt: str | None) -> list[np.ndarray]:
+    """Read points, (1, 2) each, and lines, (k, 2) each; see `read_lines_along`."""
+    features = _placed(source, crs_wkt)
+    points = [vertices[:, :2] for feature in features for vertices in feature.of_kind(POINT)]
+    found = [*points, *(line for _, line in _lines_along(source, features, crs_wkt))]
+    if not found:
+        raise RailExtractError(
+            f"{source.name} has neither points nor lines: add points on railheads, or choose another layer."
+        )
+    return found
+
+
+def read_mask(source: Source, crs_wkt: str | None) -> Mask:
+    """Read the polygons of a mask, of which overlaps count once.
+
+    Raises
+    ------
+    RailExtractError
+        There is none, one is not on the map, or they can't be transformed.
+    """
+    _placed(source, crs_wkt)
+    rings = source.rings(crs_wkt)
+    if not rings:
+        raise MissingError(source.name, "polygon")
+    return Mask.of(rings)
+
+
+def read_axes(values: Values, crs_wkt: str | None) -> PlacedAxes:
+    """Read AXIS and what states its kilometres, in a coordinate system.
+
+    Parameters
+    ----------
+    crs_wkt : str or None
+        Projected, or None for coordinates in metres that nothing transforms.
+
+    Raises
+    ------
+    RailExtractError
+        A layer can't be transformed or lacks what it should state, or they contradict each other.
+    """
+    axis, unit_m = values.source("AXIS"), unit_in_plan(crs_wkt)
+    lines = list(_axis_lines(axis, crs_wkt, unit_m))
+    if not lines:
+        raise MissingError(axis.name, "line")
+    start = None
+    if values.filled("START_KM"):
+        start = Start(values["START_KM"], values["DIRECTION"] == DECREASING)
+    posts = _posts(values.source("POSTS"), values["POST_FIELD"], crs_wkt) if values.filled("POSTS") else []
+    jumps = _jumps(values.source("JUMPS")) if values.filled("JUMPS") else []
+    made = make_axes(lines, start, posts, jumps)
+    if axis.crs_wkt and crs_wkt and parse_crs(axis.crs_wkt) != parse_crs(crs_wkt):
+        moved = f"AXIS is in {title_of(axis.crs_wkt)} and was transformed to {title_of(crs_wkt)}."
+        made = Axes(made.axes, (moved, *made.notices))
+    return PlacedAxes(made, unit_m, values["FORMAT"])
+
+
+def _placed(source: Source, crs_wkt: str | None) -> list[Feature]:
+    """Return the features in another coordinate system, all of which are on the map."""
+    features, unit_m = list(source.features(crs_wkt)), unit_in_plan(source.crs_wkt)
+    for feature in features:
+        check_places(feature.bounds, source.where(feature.number), unit_m)
+    if any(feature.is_lost for feature in features):
+        raise CrsError(
+            f"{source.name} can't be transformed to the coordinate system of the cloud ({title_of(crs_wkt)}): check "
+            "that both are assigned as the data were made."
+        )
+    return features
+
+
+def _lines_along(
+    source: Source, features: Sequence[Feature], crs_wkt: str | None
+) -> Iterator[tuple[Feature, np.ndarray]]:
+    """Yield the lines, (k, 2), without stray vertices."""
+    unit_m = unit_in_plan(crs_wkt or source.crs_wkt)
+    for feature in features:
+        for moving in map(_moving, feature.of_kind(LINE)):
+            if len(moving) > 1:
+                yield feature, check_line(moving[:, :2], source.where(feature.number), unit_m)
+
+
+def _moving(vertices: np.ndarray) -> np.ndarray:
+    """Return x, y and z of vertices, (n, 4), without those that repeat the place before."""
+    return without_steps(vertices[:, :3].copy())
+
+
+def _measured_features(source: Source, crs_wkt: str | None) -> Iterator[Feature]:
+    """Yield the features of a layer in the plane in which kilometres are measured."""
+    for feature in source.features(crs_wkt):
+        if feature.is_lost:
+            raise CrsError(
+                f"{source.name} can't be transformed to {title_of(crs_wkt)}, in which kilometres are measured: check "
+                "that both coordinate systems are assigned as the data were made."
+            )
+        yield feature
+
+
+def _axis_lines(source: Source, crs_wkt: str | None, unit_m: float) -> Iterator[AxisLine]:
+    """Yield the parts of all lines that have a length."""
+    named = next((name for name in NAME_FIELDS if name in source.fields), None)
+    for feature in _measured_features(source, crs_wkt):
+        name = (feature.row[named] if named else None) or ""
+        for vertices in feature.of_kind(LINE):
+            if len(vertices) > 1 and (np.ptp(vertices[:, :2], axis=0) > 0).any():
+                yield AxisLine(str(name), vertices[:, :2] * unit_m, vertices[:, 3])
+
+
+def _posts(source: Source, field: str | None, crs_wkt: str | None) -> list[Post]:
+    """Read the posts."""
+    name = field or post_field(source.fields)
+    if name not in source.fields:
+        raise ParameterError(f"POSTS has no field {name}: it has {', '.join(source.fields)}.")
+    found = [
+        Post(xy * unit_in_plan(crs_wkt), km_of(feature.row[name], name, "POSTS", feature.number))
+        for feature in _measured_features(source, crs_wkt)
+        for vertices in feature.of_kind(POINT)
+        for xy in vertices[:, :2]
+    ]
+    if not found:
+        raise MissingError(source.name, "point")
+    return found
+
+
+def _jumps(source: Source) -> list[Jump]:
+    """Read the table of jumps."""
+    check_jumps(source.fields)
+    return [Jump(*(km_of(row[name], name, "JUMPS", number) for name in (BACK, AHEAD))) for number, row in source.rows()]

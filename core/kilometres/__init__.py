@@ -1,0 +1,1 @@
+"""Kilometres along a line, and of places beside it."""

@@ -1,0 +1,145 @@
+"""Points that are too thin for rails are seen before any raster is made; rails are never taken for thin."""
+
+import numpy as np
+import pytest
+from rail_extract.core.checks.density import (
+    MIN_IN_WINDOW,
+    WINDOW_M,
+    occupied_squares,
+    plausible,
+    warn_of_airborne,
+    warn_of_unexplained,
+)
+from rail_extract.core.clouds.points import RailPoints
+from rail_extract.core.errors import CloudError
+from rail_extract.core.frame import LocalFrame
+from rail_extract.core.progress import Progress
+from rail_extract.core.rails import RailLine
+from rail_extract.core.tiles.grid import MemorySource, lay_out
+
+SIDE_M = 500.0
+RNG = np.random.default_rng(4)
+
+
+class Listener(Progress):
+    def __init__(self):
+        self.warnings = []
+
+    def warning(self, text):
+        self.warnings.append(text)
+
+
+def source(*parts, class_code=10):
+    return MemorySource(RailPoints(np.concatenate(parts), LocalFrame(np.zeros(3)), class_code), SIDE_M)
+
+
+def rail(start_m=0.0, length_m=100.0, per_metre=20, y_m=7.0):
+    """The sparsest rail: points anywhere on its head."""
+    count = int(length_m * per_metre)
+    return np.column_stack(
+        [start_m + RNG.uniform(0, length_m, count), y_m + RNG.uniform(-0.036, 0.036, count), np.zeros(count)]
+    )
+
+
+def strays(count, side_m=1e6):
+    return np.column_stack([RNG.uniform(-side_m / 2, side_m / 2, (count, 2)), np.zeros(count)])
+
+
+def test_the_sparsest_rail_is_plausible():
+    listener, one = Listener(), source(rail())
+    assert plausible([one], listener) == [one]
+    assert not listener.warnings
+
+
+def test_the_sparsest_rail_among_strays_is_plausible():
+    one = source(rail(length_m=20.0), strays(5_000))
+    assert plausible([one]) == [one]
+
+
+@pytest.mark.parametrize("factor", [100, 1000])
+@pytest.mark.parametrize("per_metre", [20, 600])
+def test_points_in_a_smaller_unit_are_refused(factor, per_metre):
+    with pytest.raises(CloudError, match=r"class 10 are \S+ m apart over \d+ m, .*centimetres or millimetres"):
+        plausible([source(rail(per_metre=per_metre) * factor)])
+
+
+def test_the_spacing_is_that_of_the_points():
+    line = np.column_stack([np.arange(0, 1000, 2.8), np.zeros(358), np.zeros(358)])
+    with pytest.raises(CloudError, match=r"are 2\.8 m apart over 1000 m"):
+        plausible([source(line)])
+
+
+def test_a_thin_class_beside_a_plausible_one_is_left_out_with_a_warning():
+    listener, good, thin = Listener(), source(rail()), source(rail() * 100, class_code=11)
+    assert plausible([thin, good], listener) == [good]
+    (said,) = listener.warnings
+    assert said.startswith("The points of class 11 are ")
+
+
+def test_points_in_a_larger_unit_give_a_warning():
+    listener, one = Listener(), source(rail(per_metre=600) / 1000)
+    assert plausible([one], listener) == [one]
+    (said,) = listener.warnings
+    assert said.startswith("All points of class 10 are within 0.1 m of each other: if the coordinates")
+
+
+def test_few_points_are_not_judged():
+    one = source(strays(50))
+    assert plausible([one]) == [one]
+
+
+def test_squares_of_strays_are_left_out_and_squares_of_rails_are_kept():
+    one = source(rail(length_m=1200.0), strays(5_000))
+    kept = {square.key for square in occupied_squares([one], one)}
+    assert kept == {(0, 0), (1, 0), (2, 0)}
+    assert len(lay_out([one], one)) > 4_000
+
+
+def test_a_square_into_which_a_rail_reaches_is_kept():
+    end = rail(start_m=400.0, length_m=100.2)
+    assert 0 < np.count_nonzero(end[:, 0] >= SIDE_M) < MIN_IN_WINDOW
+    one = source(end, rail(start_m=-600.0, length_m=10.0))
+    assert (1, 0) in {square.key for square in occupied_squares([one], one)}
+
+
+def test_points_with_company_across_a_corner_are_no_strays():
+    corner = np.array([SIDE_M, SIDE_M, 0.0])
+    shifts = np.array([[1, 1], [1, -1], [-1, 1], [-1, -1]])
+    heap = np.column_stack([np.repeat(shifts, 3, axis=0), np.zeros(12)]) * (WINDOW_M / 2)
+    one = source(corner + heap, np.array([[5_000.0, 0.0, 0.0]]))
+    assert {square.key for square in occupied_squares([one], one)} == {(0, 0), (0, 1), (1, 0), (1, 1)}
+    less = source(corner + heap[: MIN_IN_WINDOW - 1], np.array([[5_000.0, 0.0, 0.0]]))
+    assert not occupied_squares([less], less)
+
+
+def test_a_cloud_within_one_square_is_never_divided():
+    one = source(strays(20, side_m=100.0))
+    (whole,) = occupied_squares([one], one)
+    assert whole.is_whole_plane
+
+
+def straight(y_m, length_m=100.0):
+    xyz = np.array([[0.0, y_m, 0.0], [length_m, y_m, 0.0]])
+    return RailLine(xyz, 1, 10, points=0, resid_mm=0.0, sigma_mm=0.0, bridged_m=0.0)
+
+
+@pytest.mark.parametrize("length_m", [100.0, 700.0])
+@pytest.mark.parametrize(("others", "said"), [(0, None), (1, None), (2, "33 %"), (4, "20 %")])
+def test_points_far_from_all_rails_give_a_warning(others, said, length_m):
+    one = source(*(rail(y_m=7.0 + 0.5 * number, length_m=length_m) for number in range(others + 1)))
+    listener = Listener()
+    warn_of_unexplained(one, [straight(7.1, length_m)], listener)
+    assert [text[5:9] for text in listener.warnings] == [said] * bool(said)
+
+
+@pytest.mark.parametrize(("per_metre", "said"), [(3, "have 3.0 points per metre"), (9, "have 9.0 points"), (20, "")])
+def test_rails_of_an_airborne_cloud_give_a_warning(per_metre, said):
+    listener = Listener()
+    warn_of_airborne(source(rail(per_metre=per_metre)), [straight(7.0)], listener)
+    assert len(listener.warnings) == bool(said)
+    assert all(said in text and "use Track Centerlines from Airborne Lidar" in text for text in listener.warnings)
+
+
+def test_points_as_thin_as_those_of_an_airborne_cloud_are_refused_with_its_algorithm():
+    with pytest.raises(CloudError, match=r"too far for rails: .* For an airborne cloud, use Track Centerlines"):
+        plausible([source(rail(per_metre=2, length_m=400.0))])

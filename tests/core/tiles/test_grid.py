@@ -1,0 +1,77 @@
+"""Squares: independent of the files of a cloud, on one raster grid."""
+
+import numpy as np
+from rail_extract.core.clouds.points import RailPoints
+from rail_extract.core.frame import LocalFrame
+from rail_extract.core.raster import TILE, rasterize
+from rail_extract.core.tiles.grid import (
+    MemorySource,
+    Square,
+    assembled,
+    lay_out,
+    mosaic,
+    own_tiles,
+)
+
+CELL = 0.04
+SIDE = 4 * TILE * CELL
+FRAME = LocalFrame(np.array([387_600.0, 1_430_200.0, 500.0]), 0.3048, 0.3048)
+
+
+def cloud(seed=0, count=4000, length=150.0):
+    along = np.random.RandomState(seed).uniform(0, length, count)
+    return RailPoints(np.column_stack([along, 0.4 * along, np.full(count, 3.0)]), FRAME, 10)
+
+
+def test_squares_divide_the_points_and_margins_overlap():
+    points = cloud()
+    source = MemorySource(points, SIDE)
+    squares = lay_out([source], source)
+    own = [source.near(square, 0.0) for square in squares]
+    assert len(squares) > 4
+    assert sum(len(one.xyz) for one in own) == len(points.xyz) == sum(source.counts.values())
+    back = np.concatenate([one.frame.to_crs(one.xyz) for one in own])
+    np.testing.assert_allclose(np.sort(back[:, 0]), np.sort(FRAME.to_crs(points.xyz)[:, 0]), rtol=0, atol=1e-6)
+    for square in squares:
+        xyz = source.near(square, 5.0).xyz
+        assert xyz[:, :2].min() >= -5 and xyz[:, :2].max() < SIDE + 5
+
+
+def test_the_grid_does_not_depend_on_the_local_origin():
+    points = cloud()
+    moved = LocalFrame(FRAME.origin + 1000.0, 0.3048, 0.3048)
+    other = RailPoints(moved.to_local(FRAME.to_crs(points.xyz)), moved, 10)
+    assert MemorySource(points, SIDE).counts == MemorySource(other, SIDE).counts
+
+
+def test_a_small_cloud_is_not_divided_and_keeps_its_frame():
+    points = cloud(length=30.0)
+    source = MemorySource(points, SIDE)
+    (whole,) = lay_out([source], source)
+    assert source.near(whole, 0.0) is points
+    assert len(lay_out([source, MemorySource(cloud(), SIDE)], source)) > 1
+
+
+def test_rasters_of_squares_make_the_raster_of_the_whole():
+    points = cloud()
+    source = MemorySource(points, SIDE)
+    squares = {square.key: square for square in lay_out([source], source)}
+    rasters = {key: own_tiles(rasterize(source.near(square, 1.0).xyz, CELL), square) for key, square in squares.items()}
+    whole = assembled(rasters, squares, FRAME)
+    places = np.sort(whole.to_local(whole.cells()), axis=0)
+    zero = Square.on_grid((0, 0), SIDE, FRAME)
+    direct = rasterize(points.xyz - zero.frame.shift_to(FRAME), CELL)
+    expected = np.sort(direct.to_local(direct.cells()) + zero.frame.shift_to(FRAME)[:2], axis=0)
+    np.testing.assert_allclose(places, expected, rtol=0, atol=1e-6)
+
+
+def test_a_mosaic_contains_the_tiles_of_the_neighbours():
+    points = cloud()
+    source = MemorySource(points, SIDE)
+    squares = {square.key: square for square in lay_out([source], source)}
+    rasters = {key: own_tiles(rasterize(source.near(one, 0.0).xyz, CELL), one) for key, one in squares.items()}
+    key = sorted(squares)[2]
+    seen = mosaic(rasters, squares[key], 4)
+    expected = rasterize(source.near(squares[key], SIDE - 1e-6).xyz, CELL)
+    assert set(seen.tiles) == set(expected.tiles)
+    assert all((seen.tiles[place] == expected.tiles[place]).all() for place in seen.tiles)
