@@ -15,7 +15,7 @@ from .elements import CantElement, Figures, PlanElement, VerticalElement
 from .held import Given
 from .noise import Noise, estimated, shared_covariance
 from .plane_fit import PlanFit, Points
-from .signals import FINAL_ROUNDS, FLOOR_M, STILL_M, Signal, refitted, started
+from .signals import FINAL_ROUNDS, FLOOR_M, PLAN, STILL_M, Signal, refitted, started
 from .structure import is_within
 
 SNAP_SIGMAS, SNAP_M = 2.58, 10.0
@@ -110,9 +110,6 @@ def _moved(chain: Chain, ends: np.ndarray, limit_m: np.ndarray) -> tuple[Chain, 
     return replace(chain, p=p, q=p.copy()), moves
 
 
-LEAST_DEGREE, LARGEST_DEGREE = 0.0, 3.0
-"""Limits of the degree of a polynomial that follows the errors of an element as much as the fit does."""
-
 SURE = 3.0
 """Standard errors by which the distances of the points from the fitted curve have to show misalignment."""
 
@@ -146,7 +143,7 @@ def remaining(fit: PlanFit, points: Points, tolerance_m: float) -> Noise:
     for part in parts:
         degree = _spent(fit.jacobian[part], points.weight[part], covariance) - 1.0
         used = points.weight[part] > 0
-        pieces.append((fit.across[part][used], float(np.clip(degree, LEAST_DEGREE, LARGEST_DEGREE))))
+        pieces.append((fit.across[part][used], float(np.clip(degree, 0, PLAN.degrees[-1]))))
     step = float(points.s[-1]) / (len(points.s) - 1)
     found = estimated(pieces, step, FLOOR_M, SURE)
     return Noise(found.white_m, min(found.shared_m, tolerance_m), found.length_m)

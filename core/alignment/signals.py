@@ -16,10 +16,6 @@ from .structure import Blocks, Rules, searched
 NOISE_ROUNDS, SETTLED = 8, 1.15
 """Largest number of partitions for the noise, and the growth of the noise below which it is known."""
 
-SHORT_M, RAISED = 10.0, 2.0
-"""Mean length of a piece, metres, below which a partition follows the noise, because no track is built of such
-elements, and the factor by which the noise is then raised."""
-
 LIKELY = 2.0
 """Standard errors by which the last partition has to show misalignment: to miss it is worse than to see some where
 there is none, because the search then bends a track with it."""
@@ -130,11 +126,10 @@ def noise_of(signal: Signal, tolerance_m: float, progress: Progress = SILENT) ->
         found = estimated(rests, signal.step_m, FLOOR_M)
         noise = Noise(found.white_m, min(found.shared_m, tolerance_m), found.length_m)
         tried.append((rests, pieces))
-        is_short = s[-1] - s[0] < SHORT_M * len(pieces)
         left = noise.effective_m(signal.step_m)
-        if left < SETTLED * sigma and not is_short:
+        if left < SETTLED * sigma:
             break
-        sigma = max(left, RAISED * sigma) if is_short else left
+        sigma = left
     if estimated(rests, signal.step_m, FLOOR_M, LIKELY).shared_m:
         return _at_least(noise, signal.kind.least_m), pieces
     rests, pieces = tried[0]
@@ -219,9 +214,6 @@ PIECE_PENALTY, DEGREE_PENALTY = 1.0, 0.5
 """Cost of a piece, and of each degree, in units of the logarithm of the number of points: half of the information
 criterion on purpose, because it is easier for the search to unite pieces than to find a missing one."""
 
-KEPT_M = 60.0
-"""A start nearer than this is never dropped, metres: too few points say anything about its piece."""
-
 LONGEST_M = 1500.0
 """Starts farther behind are dropped, metres; the search unites the pieces of a longer element."""
 
@@ -278,7 +270,7 @@ def partition(
         best[block + 1], came[block + 1] = total[at, which], (starts[at], which)
         behind = bounds[block + 1] - bounds[starts]
         hopeless = best[starts] + rss[:, -1] + costs[0] > best[block + 1] + costs[-1]
-        kept = ((behind < KEPT_M) | ~hopeless) & (behind < LONGEST_M)
+        kept = ~hopeless & (behind < LONGEST_M)
         starts, factors, rest = starts[kept], factors[kept], rest[kept]
     return _traced(came, bounds, degrees)
 
