@@ -185,7 +185,6 @@ SWITCHES = (
     _rule("alignment.signals._at_least", first),
     _rule("alignment.signals.LIKELY", np.inf),
     _rule("alignment.signals.LEAST_PRICE", 0.0),
-    _rule("alignment.signals.SHORT_M", 0.0),
     _rule("alignment.structure._hang_together", lambda *_: True),
     _rule("alignment.structure.SHOULDER_M", np.inf),
     _rule("alignment.structure._united", lambda chain, *_: chain),

@@ -63,13 +63,13 @@ def draw(world: World, judged: Judged, stem: Path) -> Iterator[Path]:
 
 def _write_lines(world: World, judged: Judged, path: Path) -> Path:
     """Write rails, centerlines and findings into a GeoPackage."""
-    from rail_extract.core.files.layers import network_layers
+    from rail_extract.core.files.layers import network_makers
     from rail_extract.core.files.writing import write_layers
 
     network, scene = judged.network, world.scene
     path.unlink(missing_ok=True)
     gauges_m = (scene.standard.gauge_m, *scene.other_gauges_m)
-    layers = network_layers(network, ("rails", "centerlines", "findings"), gauges_m)
+    layers = [network_makers(network, gauges_m)[name]() for name in ("rails", "centerlines", "findings")]
     write_layers(layers, Destination.at(path), network.frame)
     return path
 

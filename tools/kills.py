@@ -41,8 +41,7 @@ from rail_extract.core.raster import rasterize
 from rail_extract.core.run.loop import Runner
 from rail_extract.core.scratch import MARK, MIN_UNMARKED_AGE_S, PREFIX
 from rail_extract.core.standards import SEARCHED_CLASSES, resolve
-from rail_extract.rail_extract_plugin.algorithms.frpdf_cleanup import FrpdfCleanup
-from rail_extract.rail_extract_plugin.algorithms.vectorize_rails import VectorizeRails
+from rail_extract.rail_extract_plugin.algorithms import ALGORITHMS
 from rail_extract.rail_extract_plugin.dialog.parameter_values import ParameterValues
 from rail_extract.rail_extract_plugin.writing.layers import write_layer as write_output
 from rail_extract.rail_extract_plugin.writing.layers import write_raster
@@ -67,7 +66,7 @@ def write_layer(destination: Destination, version: int) -> None:
     """Write rails whose number and place are the version."""
     xyz = np.array([[version, 0.0, version], [version, 10.0, version]], dtype=float)
     made = lines_layer(RAILS, [RailLine(xyz, version, 10, version, 1.0, 1.0, 0.0) for _ in range(COUNT)])
-    _write(VectorizeRails(), destination, lambda values: write_output(values, "OUTPUT", made, FRAME))
+    _write("vectorizerails", destination, lambda values: write_output(values, "OUTPUT", made, FRAME))
 
 
 def read_layer(path: Path) -> set[int]:
@@ -110,7 +109,7 @@ def write_cells(destination: Destination, version: int) -> None:
     standard = resolve("CUSTOM", 1435.0, 72.0)
     raster = rasterize(points, 0.04)
     header = header_for([raster], (10 + version % 50,), FRAME, standard)
-    _write(FrpdfCleanup(), destination, lambda values: write_raster(values, "OUTPUT", header, [raster]))
+    _write("frpdfcleanup", destination, lambda values: write_raster(values, "OUTPUT", header, [raster], SILENT))
 
 
 def read_cells(path: Path) -> set[int]:
@@ -197,8 +196,9 @@ SETS = (".shp", ".gml", ".csv", ".vpc")
 """Suffixes of outputs of several files, whose main file or folder is absent for a moment."""
 
 
-def _write(algorithm: Any, destination: Destination, write: Callable[[ParameterValues], Any]) -> None:
-    """Write an output as the algorithm does."""
+def _write(name: str, destination: Destination, write: Callable[[ParameterValues], Any]) -> None:
+    """Write an output as the algorithm of this name does."""
+    algorithm = next(one for one in ALGORITHMS if one.JOB.name == name)()
     algorithm.initAlgorithm()
     algorithm.destinations = {"OUTPUT": destination}
     write(ParameterValues(algorithm, {"OUTPUT": str(destination.path)}, QgsProcessingContext()))

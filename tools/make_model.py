@@ -23,7 +23,6 @@ from qgis.core import (  # noqa: E402
     QgsProcessingModelParameter,
 )
 from qgis.PyQt.QtCore import QPointF  # noqa: E402
-from rail_extract.core.standards import DETECT  # noqa: E402
 from rail_extract.rail_extract_plugin.dialog.cloud_parameter import model_input  # noqa: E402
 
 MODEL = Path(__file__).resolve().parent.parent / "models" / "extract_rails.model3"
@@ -77,9 +76,9 @@ def build() -> QgsProcessingModelAlgorithm:
         if not definition.isDestination() and definition.name() not in WITHOUT_STEP
     ]
     inputs[0] = model_input(inputs[0])
-    for definition in inputs:
-        if definition.name() == "STANDARD":  # each step reads it, and those after the first have no points
-            definition.setOptions([one for one in definition.options() if one != DETECT])
+    # Each step reads the standard, and those after the first have no points to detect it from.
+    standard = registry.algorithmById("railextract:rasterizerailpoints").parameterDefinition("STANDARD")
+    inputs = [standard.clone() if one.name() == "STANDARD" else one for one in inputs]
     for number, definition in enumerate(inputs):
         component = QgsProcessingModelParameter(definition.name())
         component.setPosition(QPointF((number // 8) * COLUMN, (number % 8) * ROW / 2))

@@ -78,13 +78,13 @@ DIALOGS = {
 }
 """Names of the dialogs' pictures, and their names in the guide."""
 
-MAP_SIZE, TABLE_HEIGHT, REPORT_SIZE = QSize(1000, 480), 230, (1140, 3200)
+MAP_SIZE, TABLE_HEIGHT, REPORT_SIZE = QSize(1000, 480), 230, (1140, 3260)
 """Pixels."""
 
 REVIEW_SIZE = (380, 640)
 """Pixels of the dock."""
 
-REPORT_TOP, PLOTS_TOP = 1300, 2320
+REPORT_TOP, PLOTS_TOP = 1300, 2362
 """Height of the picture of the report's top, and of the report above the plots of the first track, in pixels."""
 
 QUIETLY = (

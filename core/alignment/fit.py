@@ -17,7 +17,7 @@ from ..progress import SILENT, Progress
 from .chain import Chain
 from .deviations import Deviations, deviations_of
 from .elements import Alignment, Element, PlanElement
-from .held import Given, given_along, given_of, noted, off_element, with_round_radii, without
+from .held import Given, given_along, given_of, moved, noted, off_element, with_round_radii, without
 from .layouts import cants, chain_errors, heights, on_clothoids, plan_errors, remaining
 from .measured import LEAST_POINTS, Measured, Track, lateral_signal, measured_of
 from .noise import Noise, strays
@@ -83,7 +83,8 @@ def fit_track(
     _warn_of_noise(track.track_id, elements, progress)
     if settings.rounded and fixed is None:
         elements = with_round_radii(plan.chain, plan.points, plan.fit, elements, in_plan)
-    elements, feet = _shifted(elements, float(measured.along[0])), plan.fit.s + measured.along[0]
+    elements = tuple(moved(one, float(measured.along[0])) for one in elements)
+    feet = plan.fit.s + measured.along[0]
     first, last = _holding(track.track_id, elements, feet[measured.in_plan > 0], settings.tolerance_m, progress)
     alignment = Alignment(track.track_id, frame, elements[first : last + 1])
     alignment = _with_heights(alignment, feet, measured, settings, fixed, in_height)
@@ -148,6 +149,11 @@ class _Plan:
 class _LostError(ParameterError):
     """No chain of elements follows a line."""
 
+    def __init__(self, track_id: int) -> None:
+        super().__init__(
+            f"No chain of elements follows the line of track {track_id}: raise MIN_LENGTH, or smooth the line first."
+        )
+
 
 def _followed(
     track_id: int, measured: Measured, settings: FitParameters, fixed: Optional[Alignment], progress: Progress
@@ -171,15 +177,7 @@ def _followed(
                 "given."
             )
         return part, plan
-    raise lost or _lost(track_id)
-
-
-def _shifted(elements: Sequence[PlanElement], offset_m: float) -> tuple[PlanElement, ...]:
-    """Return elements that start farther along the line."""
-    return tuple(
-        replace(one, s_from=one.s_from + offset_m, figures=replace(one.figures, s_fit_m=one.s_from + offset_m))
-        for one in elements
-    )
+    raise lost or _LostError(track_id)
 
 
 def _fit_in_plan(
@@ -206,9 +204,9 @@ def _fit_in_plan(
             given = without(fit.elements, number, float(s[-1]))
             fit = fit_plan(given.chain, points, given.held, progress, given.poses)
     except (FitError, RuntimeError, np.linalg.LinAlgError) as error:
-        raise _lost(track_id) from error
+        raise _LostError(track_id) from error
     if not np.isfinite(fit.across).all():
-        raise _lost(track_id)
+        raise _LostError(track_id)
     return _Plan(given.chain, fit, points, used_m, remaining(fit, points, settings.tolerance_m))
 
 
@@ -217,12 +215,6 @@ def _squeezed(elements: Sequence[PlanElement], settings: FitParameters) -> Optio
     least_m = SQUEEZED * settings.min_length_m
     ends = {0, len(elements) - 1} if len(elements) > 1 else set()
     return next((number for number in ends if elements[number].length_m < least_m), None)
-
-
-def _lost(track_id: int) -> _LostError:
-    return _LostError(
-        f"No chain of elements follows the line of track {track_id}: raise MIN_LENGTH, or smooth the line first."
-    )
 
 
 def _stated(plan: _Plan) -> tuple[PlanElement, ...]:

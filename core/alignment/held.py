@@ -46,7 +46,7 @@ def given_of(fixed: Alignment, first_m: float, length_m: float) -> Given:
 
     The first and the last element are continued to the ends of the part.
     """
-    plan = [_moved(one, -first_m) for one in fixed.plan]
+    plan = [moved(one, -first_m) for one in fixed.plan]
     bounds = _bounds(fixed.track_id, plan, 0.0, length_m)
     if plan[0].s_to <= 0.0 or (len(plan) > 1 and bounds[-2] >= length_m):
         raise ParameterError(
@@ -90,7 +90,7 @@ def noted(one: PlanElement, **figures: Any) -> PlanElement:
     return replace(one, figures=Figures(r_fit_m=radius, s_fit_m=one.s_from, **figures))
 
 
-def _moved(one: PlanElement, by_m: float) -> PlanElement:
+def moved(one: PlanElement, by_m: float) -> PlanElement:
     """Return an element that starts farther along the line."""
     noted_m = None if one.figures.s_fit_m is None else one.figures.s_fit_m + by_m
     return replace(one, s_from=one.s_from + by_m, figures=replace(one.figures, s_fit_m=noted_m))
@@ -149,8 +149,8 @@ def _bend(one: Element) -> float:
 STEPS_M = (1000.0, 500.0, 100.0, 50.0, 25.0, 10.0, 5.0, 1.0)
 """Steps of round radii, the roundest first, metres."""
 
-SIGMAS = (2.0, 1.0)
-"""A radius may be rounded by this many standard errors; if the track does not fit all that are, by fewer."""
+SIGMAS = 2.0
+"""A radius may be rounded by this many standard errors."""
 
 MOST_RISE = 6.6
 """Largest rise of chi-square for a rounded radius: its 1 % level."""
@@ -164,22 +164,21 @@ def with_round_radii(
     of_part = [number for number, one in enumerate(elements) if one.type != "clothoid"]
     before = _chi_square(fit, points)
     poses = np.array([(one.x, one.y, one.heading) for one in fit.elements])
-    for sigmas in SIGMAS:
-        proposed = [round_radius(one, sigmas) for one in elements]
-        radii = [(int(part), proposed[one]) for part, one in zip(parts, of_part)]
-        held = {part: 1.0 / radius for part, radius in radii if radius}
-        if not held:
-            break
-        try:
-            rounded = fit_plan(chain, points, Held(held), progress, poses)
-        except FitError:
-            continue
-        if _chi_square(rounded, points) - before <= MOST_RISE * len(held):
-            return tuple(
-                _with_round(one, radius, off_element(rounded, points, number)[0])
-                for number, (one, radius) in enumerate(zip(elements, proposed))
-            )
-    return tuple(elements)
+    proposed = [round_radius(one, SIGMAS) for one in elements]
+    radii = [(int(part), proposed[one]) for part, one in zip(parts, of_part)]
+    held = {part: 1.0 / radius for part, radius in radii if radius}
+    if not held:
+        return tuple(elements)
+    try:
+        rounded = fit_plan(chain, points, Held(held), progress, poses)
+    except FitError:
+        return tuple(elements)
+    if _chi_square(rounded, points) - before > MOST_RISE * len(held):
+        return tuple(elements)
+    return tuple(
+        _with_round(one, radius, off_element(rounded, points, number)[0])
+        for number, (one, radius) in enumerate(zip(elements, proposed))
+    )
 
 
 def _with_round(one: PlanElement, radius: Optional[float], rms_mm: Optional[float]) -> PlanElement:

@@ -15,7 +15,8 @@ from .elements import CantElement, Figures, PlanElement, VerticalElement
 from .held import Given
 from .noise import Noise, estimated, shared_covariance
 from .plane_fit import PlanFit, Points
-from .signals import FINAL_ROUNDS, FLOOR_M, STILL_M, Signal, refitted, started
+from .signals import FINAL_ROUNDS, FLOOR_M, PLAN, STILL_M, Signal, refitted, started
+from .structure import is_within
 
 SNAP_SIGMAS, SNAP_M = 2.58, 10.0
 """A ramp's end takes the place of a clothoid's end within this many standard errors (1 % level), and metres: the end of
@@ -84,24 +85,30 @@ def _snapped(
 ) -> tuple[Chain, np.ndarray]:
     """Return a chain of cants in which ramps begin and end where clothoids do, and which joints were moved there.
 
-    Cant is built with the clothoids; the places of these are better known. A joint is moved only as far as its standard
-    error allows, which is 0 if it is held.
+    Cant is built with the clothoids; the places of these are better known. A joint is moved as far as its standard
+    error allows, which is 0 if it is held; farther, if the measured cant shows no difference.
     """
     ends = np.unique([s for one in plan if one.type == "clothoid" for s in (one.s_from, one.s_to)])
     if not len(ends) or not len(chain.p):
         return chain, np.zeros(len(chain.p), dtype=bool)
+    sure = np.minimum(SNAP_SIGMAS * errors.s[1:], SNAP_M)
+    far, moves = _moved(chain, ends, np.where(sure > 0, SNAP_M, 0.0))
+    far = refitted(far, signal, noise, np.inf)
+    if is_within(far, signal.blocks(noise).near(far), signal.kind.shown(noise)):
+        return far, moves
+    near, moves = _moved(chain, ends, sure)
+    return refitted(near, signal, noise, np.inf) if moves.any() else chain, moves
+
+
+def _moved(chain: Chain, ends: np.ndarray, limit_m: np.ndarray) -> tuple[Chain, np.ndarray]:
+    """Return a chain whose joints are at the nearest of some places within limits, (j,), and which have moved."""
     nearest = ends[np.abs(chain.p[:, None] - ends).argmin(axis=1)]
-    limit = np.minimum(SNAP_SIGMAS * errors.s[1:], SNAP_M)
-    moves = (np.abs(nearest - chain.p) <= limit) & ~np.isin(nearest, chain.p)
+    moves = (np.abs(nearest - chain.p) <= limit_m) & ~np.isin(nearest, chain.p)
     p = np.where(moves, nearest, chain.p)
     if (np.diff(np.concatenate([[chain.start], p, [chain.end]])) <= 0).any():
         return chain, np.zeros(len(chain.p), dtype=bool)
-    moved = replace(chain, p=p, q=p.copy())
-    return refitted(moved, signal, noise, np.inf), moves
+    return replace(chain, p=p, q=p.copy()), moves
 
-
-LEAST_DEGREE, LARGEST_DEGREE = 0.0, 3.0
-"""Limits of the degree of a polynomial that follows the errors of an element as much as the fit does."""
 
 SURE = 3.0
 """Standard errors by which the distances of the points from the fitted curve have to show misalignment."""
@@ -136,7 +143,7 @@ def remaining(fit: PlanFit, points: Points, tolerance_m: float) -> Noise:
     for part in parts:
         degree = _spent(fit.jacobian[part], points.weight[part], covariance) - 1.0
         used = points.weight[part] > 0
-        pieces.append((fit.across[part][used], float(np.clip(degree, LEAST_DEGREE, LARGEST_DEGREE))))
+        pieces.append((fit.across[part][used], float(np.clip(degree, 0, PLAN.degrees[-1]))))
     step = float(points.s[-1]) / (len(points.s) - 1)
     found = estimated(pieces, step, FLOOR_M, SURE)
     return Noise(found.white_m, min(found.shared_m, tolerance_m), found.length_m)

@@ -211,7 +211,8 @@ def _points(track: Track) -> Measured:
 
 
 SPACING_M = 1.0
-"""Least distance of the points, metres: errors of 2 mm lengthen a line with closer points by 1 in 10,000."""
+"""Least distance of the points, and distance at which cant is taken from rails, metres: errors of 2 mm lengthen a line
+with closer points by 1 in 10,000."""
 
 
 def groups(xy: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -235,9 +236,6 @@ def lateral_signal(xy: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return s, np.concatenate([[0.0], np.cumsum((theta - theta[0]) * h)])
 
 
-STEP_M = 1.0
-"""Distance between the places at which the cant is taken, metres."""
-
 NEAREST_M, FARTHEST_M = 0.25, 1.0
 """Distances of a rail from the middle of its track, metres: half of all gauges in use, with canted and wide track."""
 
@@ -250,13 +248,13 @@ def cant_of_rails(line: np.ndarray, rails: Sequence[np.ndarray]) -> np.ndarray:
 
     Rails, (k, 3) metres, may be those of other tracks, too.
     """
-    places = np.concatenate([Polyline(rail).resampled(STEP_M).xyz for rail in rails]) if rails else np.zeros((0, 3))
+    places = np.concatenate([Polyline(rail).resampled(SPACING_M).xyz for rail in rails]) if rails else np.zeros((0, 3))
     places = places[np.isfinite(places[:, 2])]
     if not len(places):
         return np.zeros((0, 2))
     own = Polyline(line)
     feet = own.feet(places[:, :2], FARTHEST_M)
-    t = np.arange(0.0, own.length_m, STEP_M)
+    t = np.arange(0.0, own.length_m, SPACING_M)
     sides = []
     for side in (1.0, -1.0):
         across = side * feet.across

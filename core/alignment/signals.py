@@ -16,10 +16,6 @@ from .structure import Blocks, Rules, searched
 NOISE_ROUNDS, SETTLED = 8, 1.15
 """Largest number of partitions for the noise, and the growth of the noise below which it is known."""
 
-SHORT_M, RAISED = 10.0, 2.0
-"""Mean length of a piece, metres, below which a partition follows the noise, because no track is built of such
-elements, and the factor by which the noise is then raised."""
-
 LIKELY = 2.0
 """Standard errors by which the last partition has to show misalignment: to miss it is worse than to see some where
 there is none, because the search then bends a track with it."""
@@ -55,13 +51,24 @@ class Kind:
         Whether the bend may change linearly.
     least_m : float
         Least standard deviation of the errors, metres.
+    shown_m : float
+        See `Rules`; where the line was smoothed.
     """
 
     order: int
     degrees: tuple[int, ...]
     ramps: bool
     least_m: float = 0.0
+    shown_m: float = 0.0
 
+    def shown(self, noise: Noise) -> float:
+        """Return the distance from a curve that no survey shows, metres; 0 where single points scatter."""
+        return self.shown_m if noise.white_m < SMOOTH * self.shown_m else 0.0
+
+
+SMOOTH = 0.2
+"""Share of `Kind.shown_m` below which single points scatter only if the line was smoothed: errors of several lengths
+hang together then, and what the search takes for its noise is less than these."""
 
 LEAST_ERROR_M = 0.001
 """Least standard deviation of a line across and in height, metres: no survey of a track is better. Where single points
@@ -69,7 +76,8 @@ scatter by less, the line was smoothed, and what their errors lack is shared by 
 would be taken for elements."""
 
 PLAN, HEIGHT = Kind(2, (1, 2, 3), True, LEAST_ERROR_M), Kind(2, (1, 2), False, LEAST_ERROR_M)
-CANT = Kind(1, (0, 1), False)
+CANT = Kind(1, (0, 1), False, shown_m=math.sqrt(2.0) * LEAST_ERROR_M)
+"""Kinds of signals. Cant is the difference of two heights."""
 
 
 @dataclass(frozen=True)
@@ -118,11 +126,10 @@ def noise_of(signal: Signal, tolerance_m: float, progress: Progress = SILENT) ->
         found = estimated(rests, signal.step_m, FLOOR_M)
         noise = Noise(found.white_m, min(found.shared_m, tolerance_m), found.length_m)
         tried.append((rests, pieces))
-        is_short = s[-1] - s[0] < SHORT_M * len(pieces)
         left = noise.effective_m(signal.step_m)
-        if left < SETTLED * sigma and not is_short:
+        if left < SETTLED * sigma:
             break
-        sigma = max(left, RAISED * sigma) if is_short else left
+        sigma = left
     if estimated(rests, signal.step_m, FLOOR_M, LIKELY).shared_m:
         return _at_least(noise, signal.kind.least_m), pieces
     rests, pieces = tried[0]
@@ -162,7 +169,7 @@ def find_structure(
     noise, pieces = noise_of(signal, tolerance_m, first)
     sigma = noise.effective_m(signal.step_m)
     price = max(math.log(len(signal.s) * (noise.white_m / sigma) ** 2), LEAST_PRICE)
-    rules = Rules(signal.kind.ramps, jumps or not signal.kind.ramps, least_m, price)
+    rules = Rules(signal.kind.ramps, jumps or not signal.kind.ramps, least_m, price, signal.kind.shown(noise))
     chain = _from_pieces(pieces, signal.kind.order, rules)
     return searched(chain, signal.blocks(noise), rules, second), noise
 
@@ -206,9 +213,6 @@ SCALE_M = 300.0
 PIECE_PENALTY, DEGREE_PENALTY = 1.0, 0.5
 """Cost of a piece, and of each degree, in units of the logarithm of the number of points: half of the information
 criterion on purpose, because it is easier for the search to unite pieces than to find a missing one."""
-
-KEPT_M = 60.0
-"""A start nearer than this is never dropped, metres: too few points say anything about its piece."""
 
 LONGEST_M = 1500.0
 """Starts farther behind are dropped, metres; the search unites the pieces of a longer element."""
@@ -266,7 +270,7 @@ def partition(
         best[block + 1], came[block + 1] = total[at, which], (starts[at], which)
         behind = bounds[block + 1] - bounds[starts]
         hopeless = best[starts] + rss[:, -1] + costs[0] > best[block + 1] + costs[-1]
-        kept = ((behind < KEPT_M) | ~hopeless) & (behind < LONGEST_M)
+        kept = ~hopeless & (behind < LONGEST_M)
         starts, factors, rest = starts[kept], factors[kept], rest[kept]
     return _traced(came, bounds, degrees)
 

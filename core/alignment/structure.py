@@ -107,12 +107,15 @@ class Rules:
         Least length of a part or a ramp, metres.
     price : float
         Cost of a parameter, in units of chi-square.
+    shown_m : float
+        Distance of a signal from its curve that no survey shows, metres: up to there, fewer parameters are better.
     """
 
     ramps: bool
     jumps: bool
     least_m: float
     price: float
+    shown_m: float = 0.0
 
 
 def searched(chain: Chain, blocks: Blocks, rules: Rules, progress: Progress = SILENT) -> Chain:
@@ -186,6 +189,10 @@ def _improved(part: Chain, m: int, blocks: Blocks, rules: Rules, accepted: set[t
     now, rss = fitted(part, samples, rules.least_m, FIT_STEPS)
     cost = rss + rules.price * now.size
     candidates = list(simpler(now, m, rules.ramps, rules.jumps))
+    if is_within(now, samples, rules.shown_m):
+        fewer = [fitted(one, samples, rules.least_m, FIT_STEPS) for one in candidates if one.size < now.size]
+        within = [one for one in fewer if is_within(one[0], samples, rules.shown_m)]
+        return (min(within, key=lambda one: one[1])[0], True) if within else (now, False)
     if _hang_together(now, samples):
         candidates += richer(now, m, rules.ramps, rules.jumps, rules.least_m)
     ranked = []
@@ -214,6 +221,12 @@ def _is_new(chain: Chain, accepted: set[tuple]) -> bool:
         return False
     accepted.add(state)
     return True
+
+
+def is_within(chain: Chain, samples: Samples, limit_m: float) -> bool:
+    """Return whether all samples lie within a distance of the curve of a fitted chain."""
+    plain = replace(samples, factor=None)
+    return bool((np.abs(residuals(chain, plain)) * np.sqrt(plain.variance) <= limit_m).all())
 
 
 def _hang_together(chain: Chain, samples: Samples) -> bool:

@@ -60,6 +60,8 @@ class SurveyedLine:
         Standard errors across and in height; NaN where they are unknown.
     is_rail : bool
         Whether it may be one of the two rails of a track; else it is a centerline.
+    name : str
+        What the report calls it.
     """
 
     number: int
@@ -67,6 +69,7 @@ class SurveyedLine:
     sigma_m: float = np.nan
     sigmaz_m: float = np.nan
     is_rail: bool = True
+    name: str = ""
 
 
 @dataclass(frozen=True)
@@ -108,6 +111,8 @@ class LineDifferences:
     ----------
     line_id : int
         Of the reference; of the other survey where the state is "extra".
+    name : str
+        Of this line.
     state : object
         "both" or "missing" at stations of a line of the reference; of a line of the other survey "extra", or empty
         where the reference has it.
@@ -132,6 +137,7 @@ class LineDifferences:
     """
 
     line_id: int
+    name: str
     state: np.ndarray
     input_id: np.ndarray
     xyz: np.ndarray
@@ -313,6 +319,7 @@ def _compare(
     return LineDifferences.at(
         (t, places, left),
         line_id=line.number,
+        name=line.name,
         state=np.where(found < 0, MISSING, BOTH).astype(object),
         input_id=ids,
         across_mm=1000 * np.sum(step[:, :2] * left, axis=1),
@@ -374,6 +381,7 @@ def _extra(
     return LineDifferences.at(
         (t, places, left),
         line_id=line.number,
+        name=line.name,
         state=np.where(found < 0, EXTRA, "").astype(object),
         input_id=np.full(len(t), line.number, dtype=object),
     )

@@ -60,7 +60,7 @@ def read_landxml(path: Path, east_first: bool = False, progress: Progress = SILE
         raise AlignmentFileError(
             f"{path.name} has no alignment with a CoordGeom: export the alignments from the design program, too."
         )
-    wheres = [f"alignment {node.get('name', '')[:60] or number} of {path.name}" for number, node in enumerate(drawn, 1)]
+    wheres = [f"alignment {_name_of(node)[:60] or number} of {path.name}" for number, node in enumerate(drawn, 1)]
     plans = [parts_of(node, where, progress) for node, where in zip(drawn, wheres)]
     _check_turns(path.name, [part for plan in plans for part in plan], east_first)
     start = plans[0][0].start if east_first else plans[0][0].start[::-1]
@@ -96,13 +96,18 @@ def _alignment(
     """Return an alignment with its profile, cant and kilometres."""
     stations = stations_of_file(node, where)
     profile, cant = profile_of(node, where, progress), cant_of(node, where, progress)
-    made = Alignment(track_id, frame, plan, profile, cant, node.get("name", ""))
+    made = Alignment(track_id, frame, plan, profile, cant, _name_of(node))
     return with_kilometres(within_plan(made, where, progress, float(node.get("staStart", "0"))), stations, progress)
+
+
+def _name_of(node: ET.Element) -> str:
+    """Return the name of an alignment on one line, as messages and layers state it."""
+    return " ".join(node.get("name", "").split())
 
 
 def _track_ids(nodes: Sequence[ET.Element]) -> list[int]:
     """Return the numbers in the names if this program has given them, else numbers from 1."""
-    found = [OWN_NAME.fullmatch(node.get("name") or "") for node in nodes]
+    found = [OWN_NAME.fullmatch(_name_of(node)) for node in nodes]
     numbers = [int(one[1]) for one in found if one]
     return numbers if len(set(numbers)) == len(nodes) else list(range(1, len(nodes) + 1))
 

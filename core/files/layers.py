@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, count
 from typing import TYPE_CHECKING, Any, ClassVar, Union
@@ -133,11 +133,6 @@ def network_makers(network: RailNetwork, gauges_m: Sequence[float]) -> dict[str,
         "quality": lambda: quality_layer(network.geometry),
         "findings": lambda: findings_layer(list_findings(network, gauges_m)),
     }
-
-
-def network_layers(network: RailNetwork, names: Collection[str], gauges_m: Sequence[float]) -> list[Layer]:
-    """Make the layers of an extraction whose names are among `names`; see `network_makers`."""
-    return [make() for name, make in network_makers(network, gauges_m).items() if name in names]
 
 
 def lines_layer(product: Product, lines: Sequence[Line]) -> Layer:

@@ -120,7 +120,7 @@ def alignments(table: Iterable[Row], frame: LocalFrame, progress: Progress = SIL
         if _layout(row):
             tracks.setdefault(row["track_id"], []).append(row)
     in_order = sorted(tracks, key=lambda number: (number is not None, number))
-    return [within_plan(_alignment(number, tracks[number], frame), _track(number), progress) for number in in_order]
+    return [within_plan(_alignment(number, tracks[number], frame), f"track {number}", progress) for number in in_order]
 
 
 def _alignment(track_id: Optional[int], table: list[Row], frame: LocalFrame) -> Alignment:
@@ -131,7 +131,7 @@ def _alignment(track_id: Optional[int], table: list[Row], frame: LocalFrame) -> 
         _check_order(members)
     if "H" not in by_layout:
         raise ParameterError(
-            f"The element table has no row with layout H for {_track(track_id)}: give it the elements in plan, too."
+            f"The element table has no row with layout H for track {track_id}: give it the elements in plan, too."
         )
     return Alignment(
         track_id,
@@ -222,7 +222,11 @@ def _vertical_element(row: Row, frame: LocalFrame) -> VerticalElement:
     z = float(frame.to_local(np.array([0.0, 0.0, _needed(row, "z")]))[2])
     grade_from, grade_to = _ends(row, ("grade", "parabola"), "grade1_pm", "grade2_pm")
     radius = _edited_radius(row)
-    if row.get("type") == "parabola" and radius is not None and (grade_from == grade_to or _is_fitted(row)):
+    if (
+        row.get("type") == "parabola"
+        and radius is not None
+        and (grade_from == grade_to or row.get("r_fit_m") is not None)
+    ):
         grade_to = grade_from + length_m * _bend(radius)
     return _checked(row, VerticalElement(s_from, length_m, z, grade_from, grade_to, _figures(row)), "fill r1_m")
 
@@ -247,11 +251,6 @@ def _checked(row: Row, made: Bent, remedy: str) -> Bent:
             f"write {made.type}."
         )
     return made
-
-
-def _is_fitted(row: Row) -> bool:
-    """Return whether a fit has noted the radius of the row."""
-    return row.get("r_fit_m") is not None
 
 
 def _extent(row: Row) -> tuple[float, float]:
@@ -290,7 +289,3 @@ def _where(row: Row) -> str:
     """Name a row in a message."""
     no, layout, track = (quoted(row.get(name)).strip("'") for name in ("no", "layout", "track_id"))
     return f"The element {no} of layout {layout} of track {track}"
-
-
-def _track(track_id: Optional[int]) -> str:
-    return f"track {track_id}"

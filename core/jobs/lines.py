@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import re
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
@@ -17,12 +17,16 @@ from ..design_places import has_stray
 from ..errors import CrsError, MissingError, RailExtractError
 from ..fields import CENTERLINE_FIELDS, RAIL_FIELDS, Field
 from ..frame import ORIGIN_STEP, LocalFrame
-from ..polyline import Polyline
+from ..polyline import Polyline, project
 from ..progress import Progress
 from ..rails import NO_GAPS, SAME_SUM_M, Centerline, RailLine
+from ..standards import GAUGE_RANGE_MM, HEAD_WIDTH_RANGE_MM
 
 Row = Mapping[str, Any]
 Made = TypeVar("Made")
+
+BOTH_RAILS_M = (GAUGE_RANGE_MM[1] + HEAD_WIDTH_RANGE_MM[1]) / 1000
+"""Largest distance between the two rails of a track, metres; pieces of one rail are closer than a quarter of it."""
 
 MAX_WHOLE, ID = 2**31 - 1, re.compile(r"\s*\d{1,10}\s*")
 """Largest whole number of a field in every format, and an id in a list of them."""
@@ -121,16 +125,34 @@ class Lines:
         a centerline.
         """
         id_field = next((one for one in ("rail_id", "track_id") if one in self.fields), "")
+        kind = {"rail_id": "rail", "track_id": "track"}.get(id_field, "line")
+        numbers = [_whole(row, id_field, feature) for feature, row, _ in self.parts]
         return tuple(
             SurveyedLine(
-                _whole(row, id_field, feature),
+                number,
                 xyz,
                 _number(row, "sigma_mm", math.nan) / 1000,
                 _number(row, "sigmaz_mm", math.nan) / 1000,
                 id_field != "track_id",
+                f"{kind} {number}{within}",
             )
-            for feature, row, xyz in self.parts
+            for number, within, (_, row, xyz) in zip(numbers, self._in_tracks(), self.parts)
         )
+
+    def _in_tracks(self) -> Iterator[str]:
+        """Yield for each rail its side and its track in words; nothing for lines that belong to no track, or several.
+
+        The other rails of the track show the side.
+        """
+        rails: dict[str, list[np.ndarray]] = {}
+        for _, row, xyz in self.parts:
+            rails.setdefault(str(row.get("track_ids") or ""), []).append(xyz)
+        for _, row, xyz in self.parts:
+            track = str(row.get("track_ids") or "")
+            mates = [one for one in rails[track] if one is not xyz] if ID.fullmatch(track) else []
+            across = project([xyz], np.concatenate(mates)[:, :2], BOTH_RAILS_M).across if mates else np.empty(0)
+            across = across[np.abs(across) > BOTH_RAILS_M / 4]
+            yield f" ({'right' if np.median(across) > 0 else 'left'} in track {track})" if len(across) else ""
 
     def _made(
         self, kind: Callable[..., Made], columns: Sequence[Field], id_field: str, **defaults: float

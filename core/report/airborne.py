@@ -11,11 +11,19 @@ from ..airborne.cross_sections import STATION_M
 from ..airborne.remarks import FLIGHT
 from ..airborne.survey import AirborneTrack, Survey
 from ..checks.listing import OFF_RAIL_MM, Finding
-from ..progress import counted, metres
-from .markup import made, page, section, table, verdict_box
+from ..progress import counted, metres, written
+from .markup import legend, made, page, section, table, verdict_box
+from .origin import stated
+from .plan import Course, draw_plan
 
 GOOD_SHARE, FAIR_SHARE = 0.95, 0.7
 """Shares of the guides' length that must be seen for a verdict of good, and of usable."""
+
+UNSEEN = "unsupported"
+"""CSS class of the marks where a track is not seen."""
+
+KEYS = (("seen", {"class_": "fine"}), ("not seen", {"class_": UNSEEN}))
+"""Legend of the map; its numbers are those of the guides."""
 
 OTHER = "a second track without a guide {:.1f} m to the {}: give it a guide, so that neither is taken for the other"
 
@@ -99,10 +107,16 @@ def airborne_page(survey: Survey, source: str, facts: Mapping[str, str]) -> str:
         "Track centerlines from airborne lidar",
         source,
         verdict_box(kind, words, (*survey.warnings, FLIGHT)),
+        section("Map", draw_plan(_courses(survey)), legend(KEYS)),
         section("Tracks", _tracks(survey)),
         section("Where to look", _places(survey)),
-        made({**facts, "Density": f"{survey.density:.1f} points per square metre"}),
+        made({**stated(survey.frame.crs_wkt), **facts, "Density": f"{survey.density:.1f} points per square metre"}),
     )
+
+
+def _courses(survey: Survey) -> list[Course]:
+    """Return the tracks for the map; where one is not seen, its guide is near."""
+    return [Course(str(one.guide_id), one.xyz, {UNSEEN: ~one.seen.astype(bool)}) for one in survey.tracks]
 
 
 def _tracks(survey: Survey) -> str:
@@ -120,7 +134,7 @@ def _row(track: AirborneTrack) -> tuple[object, ...]:
         f"{100 * seen.mean():.0f} %",
         f"{np.median(track.sigma_mm[seen]):.0f} mm" if seen.any() else "",
         f"{np.median(track.sigmaz_mm[seen]):.0f} mm" if seen.any() else "",
-        f"{cant.min():.0f} to {cant.max():.0f} mm" if seen.any() else "",
+        f"{written(cant.min(), '.0f')} to {written(cant.max(), '.0f')} mm" if seen.any() else "",
         f"{np.abs(radius).min():,.0f} m" if len(radius) else "straight",
     )
 

@@ -153,9 +153,9 @@ def _row(number: int, one: Element) -> tuple[str, ...]:
 def _ends(one: Element) -> tuple[str, str]:
     """Write radius, gradient or cant at start and end."""
     if isinstance(one, CantElement):
-        return f"{1000 * one.cant_from_m:+.1f} mm", f"{1000 * one.cant_to_m:+.1f} mm"
+        return figure(1000 * one.cant_from_m, "+.1f"), figure(1000 * one.cant_to_m, "+.1f")
     if isinstance(one, VerticalElement):
-        return f"{1000 * one.grade_from:+.3f} ‰", f"{1000 * one.grade_to:+.3f} ‰"
+        return figure(1000 * one.grade_from, "+.3f", "‰"), figure(1000 * one.grade_to, "+.3f", "‰")
     start, end = (f"R {1 / bend:,.2f} m" if bend else "straight" for bend in (one.k_from, one.k_to))
     return start, end
 

@@ -175,7 +175,7 @@ def _sections(line: LineDifferences) -> Iterator[tuple[object, ...]]:
         for start_m, end_m, stations in line.sections(which):
             off_mm = (largest(getattr(line, name)[stations]) for name in ("across_mm", "height_mm"))
             place = f"{start_m:,.1f} to {end_m:,.1f} m"
-            yield (what, line.line_id, place, metres(end_m - start_m), *(figure(one, unknown="") for one in off_mm))
+            yield (what, line.name, place, metres(end_m - start_m), *(figure(one, unknown="") for one in off_mm))
 
 
 def _profiles(line: LineDifferences, counts_shift: bool) -> str:
@@ -196,6 +196,5 @@ def _profiles(line: LineDifferences, counts_shift: bool) -> str:
             curves.append(Curve(line.chainage_m, values))
             unit = "[mm]; green: limits of a movement" if limits else "[mm]"
             panels.append(Panel(name, unit, curves, MIN_SPAN_MM))
-    return section(
-        f"Line {line.line_id}", draw_panels(f"Differences of line {line.line_id}", panels, along, "chainage [m]")
-    )
+    drawn = draw_panels(f"Differences of {line.name}", panels, along, "chainage [m]")
+    return section(f"{line.name[:1].upper()}{line.name[1:]}", drawn)

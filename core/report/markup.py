@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from html import escape
+from itertools import compress
 
 import numpy as np
 
@@ -173,9 +174,14 @@ def legend(keys: Iterable[tuple[str, Mapping[str, str]]]) -> str:
 
 
 def table(headings: Iterable[str], rows: Iterable[Iterable[object]], class_: str = "scroll", kind: str = "") -> str:
-    """Return a table of escaped texts in a box of a class; of the `kind` "words", its cells begin on the left."""
-    head = tag("tr", *(tag("th", text(heading)) for heading in headings))
-    body = (tag("tr", *(tag("td", text(cell)) for cell in row)) for row in rows)
+    """Return a table of escaped texts in a box of a class; of the `kind` "words", its cells begin on the left.
+
+    Columns without a text in any row are left out.
+    """
+    cells = [[str(cell) for cell in row] for row in rows]
+    used = [any(column) for column in zip(*cells)]
+    head = tag("tr", *(tag("th", text(heading)) for heading in compress(headings, used)))
+    body = (tag("tr", *(tag("td", text(cell)) for cell in compress(row, used))) for row in cells)
     return tag("div", tag("table", tag("thead", head), tag("tbody", *body), class_=kind or None), class_=class_)
 
 

@@ -9,11 +9,12 @@ import numpy as np
 from ..checks.findings import DOUBTS, GAUGE_OFF_MM, UNSUPPORTED, Doubt, Findings, TrackFindings, examine, known, median
 from ..checks.listing import Finding, listed, verdict
 from ..frame import LocalFrame
-from ..progress import metres
+from ..progress import metres, written
 from ..rails import ENOUGH_CELLS_PER_M, RailNetwork, SearchFigures
 from .limits import limits_table
 from .markup import figure, legend, made, note, page, section, table, tag, text, tiles, verdict_box
-from .track_plots import draw_plan, draw_profiles, draw_strips
+from .plan import Course, draw_plan
+from .track_plots import draw_profiles, draw_strips
 
 CLASSES_ADVICE = (
     "Rail classes: choose the class of the rails; in a raw cloud, which has none, have the rail points found."
@@ -81,8 +82,23 @@ def build_page(
 
 def _of_all(findings: Findings) -> list[str]:
     """Write what is shown of all tracks together."""
-    plan, limits = section("Map", draw_plan(findings), _keys()), section("Limits", limits_table(findings.tracks))
+    plan, limits = (
+        section("Map", draw_plan(_courses(findings)), _keys()),
+        section("Limits", limits_table(findings.tracks)),
+    )
     return [plan, _findings(findings), _tracks(findings), limits]
+
+
+def _courses(findings: Findings) -> list[Course]:
+    """Return the tracks for the map, the most severe doubts on top."""
+    return [
+        Course(
+            str(track.line.track_id),
+            track.geometry.xyz,
+            {doubt.name: track.doubtful[doubt] for doubt in reversed(DOUBTS)},
+        )
+        for track in findings.tracks
+    ]
 
 
 def _verdict(findings: Findings, network: RailNetwork) -> str:
@@ -193,9 +209,9 @@ def _kilometres(track: TrackFindings) -> str:
     return f"{known[0]} to {known[-1]}" if known else "none"
 
 
-def _span(values: np.ndarray, unit: str) -> str:
+def _span(values: np.ndarray, unit: str, form: str = ".1f") -> str:
     values = known(values)
-    return f"{values.min():.1f} to {values.max():.1f} {unit}" if len(values) else "unknown"
+    return f"{written(values.min(), form)} to {written(values.max(), form)} {unit}" if len(values) else "unknown"
 
 
 def _tightest(radius_m: np.ndarray) -> str:
@@ -253,7 +269,7 @@ def _strips(network: RailNetwork) -> str:
         offsets = [
             cell
             for values in (course.across_mm, course.up_mm)
-            for cell in (f"{values.mean():+.1f} mm", f"{values.min():+.1f} to {values.max():+.1f} mm")
+            for cell in (figure(values.mean(), "+.1f"), _span(values, "mm", "+.1f"))
         ]
         rows.append((course.track_id, course.strip, metres(float(len(course.chainage_m))), *offsets))
     for track_id in dict.fromkeys(course.track_id for course in network.strips):

@@ -71,7 +71,7 @@
       <column type="field" name="left_ids" width="110" hidden="0"/>
       <column type="field" name="right_ids" width="120" hidden="0"/>
       <column type="field" name="length_m" width="110" hidden="0"/>
-      <column type="field" name="gauge_mm" width="160" hidden="0"/>
+      <column type="field" name="gauge_mm" width="170" hidden="0"/>
       <column type="field" name="gaugesd_mm" width="280" hidden="0"/>
       <column type="field" name="cant_mm" width="160" hidden="0"/>
       <column type="field" name="cantmax_mm" width="180" hidden="0"/>

@@ -454,6 +454,10 @@ def onwards(driver: Driver) -> Iterator:
     export = yield lambda: next((one for one in _dialogs() if one.algorithm().name() == "exportalignment"), None)
     elements = QgsProject.instance().mapLayer(export.mainWidget().wrappers["INPUT"].parameterValue())
     driver.keep("exported", elements.name())
+    designs: dict[int, list[str]] = {}
+    for one in elements.getFeatures():
+        designs.setdefault(one["track_id"], []).append(f"{one['layout']} {one['type']}")
+    driver.keep("designs", list(designs.values()))
     driver.picture("onwards_export")
     yield from close(export)
     yield from close(dialog)
@@ -478,6 +482,8 @@ def _compare_lifted(driver: Driver, rails: QgsVectorLayer) -> Iterator:
     dialog = yield from open_dialog("comparetracks")
     dialog.setParameters({"REFERENCE": rails.id(), "INPUT": lifted.id()})
     driver.keep("comparison", (yield from press_run(dialog)))
+    page = Path(dialog.results()["REPORT"]).read_text(encoding="utf-8")
+    driver.keep("compared", re.findall("<h2>(.*?)</h2>", page))
     yield from close(dialog)
     (differences,) = (one for one in QgsProject.instance().mapLayers().values() if one.name().startswith("Differences"))
     iface.mapCanvas().setExtent(differences.extent())
@@ -843,6 +849,8 @@ def model(driver: Driver) -> Iterator:
     later(designer.actionRun().trigger)
     dialog = yield lambda: window("AlgorithmDialog")
     dialog.mainWidget().wrappers["INPUT"].widget.combo.lineEdit().insert(str(Path(SAMPLE).parent))
+    standards = dialog.mainWidget().wrappers["STANDARD"]
+    driver.keep("standard of the model", [standards.value(), standards.parameterDefinition().help()])
     dialog.setParameters(PART)
     driver.picture("model_dialog")
     driver.keep("log", (yield from press_run(dialog)))

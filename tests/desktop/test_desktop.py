@@ -351,6 +351,12 @@ def test_the_next_step_after_a_fit_exports_its_elements(run_scenario):
     assert session["exported"] == "Elements: sample"
 
 
+def test_three_tracks_of_one_design_have_the_same_elements(run_scenario):
+    session = run_scenario("onwards")
+    plan, cant = ["H line", "H clothoid", "H arc"], ["C constant", "C ramp", "C constant"]
+    assert session["designs"] == 3 * [[*plan, *4 * ["V parabola"], *cant]]
+
+
 def test_a_copy_with_kilometres_has_the_style_of_its_layer(run_scenario):
     session = run_scenario("onwards")
     assert session["aliases"] == ["In doubt [m]", "Kilometre"]
@@ -363,6 +369,7 @@ def test_a_lift_of_all_lines_is_in_the_headline_and_in_the_map(run_scenario):
         "The later survey is shifted by +0.0 mm east, +0.0 mm north, +10.0 mm up; apart from that, nothing has moved"
     )
     assert shift in session["comparison"]
+    assert {"Rail 1 (left in track 1)", "Rail 2 (right in track 1)"} <= set(session["compared"])
     assert session["drawn"] == ["shifted with all lines, not moved otherwise"]
 
 
@@ -373,3 +380,5 @@ def test_model_takes_a_folder_and_runs(run_scenario):
     made = {name for name, value in session["results"].items() if value}
     assert made == {"rails:RAILS", "centerlines:CENTERLINES", "quality:QUALITY", "quality:REPORT"}
     assert "Execution completed" in session["log"]
+    standard, text = session["standard of the model"]
+    assert standard != "DETECT" and "DETECT" not in text  # steps after the first have no points

@@ -142,6 +142,9 @@ FAULTS = {
         "a curve of 1 mm radius that is 1000 m long": of_file(landxml(LINE + TINY)),
         "a spiral of infinite length": of_file(landxml(LINE + SPIRAL.replace('"60"', '"INF"'))),
         "a curve of negative length": of_file(landxml(LINE + CURVE.replace('"300"', '"300" length="-139"'))),
+        "a curve of negative length, and line breaks in the name of its alignment": of_file(
+            landxml(LINE + CURVE.replace('"300"', '"300" length="-139"')).replace('"A"', '"A&#10;0&#10;EOF"')
+        ),
         "an infinite cant": of_file(landxml(more=CANT)),
         "an infinite station": of_file(landxml(start="INF")),
         "a profile off the plan": profile((700, 10), (900, 12)),

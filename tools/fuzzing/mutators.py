@@ -36,6 +36,7 @@ WORDS = (
     b"1e200",
     b"-1e308",
     b"INF",
+    b'"A&#10;0&#10;EOF"',
 )
 """Texts that take the place of a word in JSON, XML, CSV or WKT."""
 

@@ -104,6 +104,17 @@ def test_errors_of_a_smoothed_line_are_not_taken_for_elements(seed):
     assert len(found.vertical) == 1
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_cant_that_waves_by_less_than_a_survey_shows_has_the_elements_of_its_clothoids(seed):
+    one, s = design(), np.arange(521.0)
+    phase = np.random.default_rng(seed).uniform(0, 2 * np.pi, 2)
+    waves = 0.0004 * np.sin(s / 12 + phase[0]) + 0.0003 * np.sin(s / 5 + phase[1])
+    cant, line = np.column_stack([s, one.cants(s) + waves]), surveyed(one, np.random.default_rng(seed), 0.0005)
+    found = fit(Track(1, line, cant, np.zeros(len(s), dtype=bool))).alignment
+    np.testing.assert_allclose([part.s_from for part in found.cant], [0, 120, 180, 330, 380], atol=0.5)
+    np.testing.assert_allclose([part.cant_from_m for part in found.cant], [0, 0, -0.08, -0.08, 0], atol=0.0006)
+
+
 def test_a_straight_stays_one_element():
     straight = Alignment(1, FRAME, chained((0.0, 0.0), 1.0, [(400.0, 0, 0)]), (VerticalElement(0, 400, 0, 0, 0),))
     counts = [len(fit(track(straight, seed, white_m=0.004)).alignment.plan) for seed in range(10)]

@@ -1,10 +1,12 @@
 """Vector files that are damaged, or that GDAL and GEOS disagree about."""
 
+import json
 import os
 
 import numpy as np
 import pytest
-from rail_extract.core.errors import ParameterError
+from rail_extract.core.clouds.crs import parse_crs
+from rail_extract.core.errors import CrsError, ParameterError
 
 pyogrio, shapely = pytest.importorskip("pyogrio"), pytest.importorskip("shapely")
 
@@ -37,3 +39,13 @@ def test_a_layer_of_a_file_is_named(tmp_path):
     for name, y in (("", 0), ("|layername=first", 0), ("|layername=second", 5)):
         (line,) = read_lines_along(read_features(f"{path}{name}", "GUIDE"), None)
         assert line[:, 1].tolist() == [y, y]
+
+
+def test_a_line_that_has_no_place_in_the_system_of_the_cloud_is_refused_and_not_left_out(tmp_path):
+    path = tmp_path / "guide.geojson"
+    lines = [[[9.0, 52.0], [9.001, 52.0]], [[9.0, 95.0], [9.001, 95.0]]]
+    path.write_text(json.dumps({"type": "MultiLineString", "coordinates": lines}))
+    guide = read_features(path, "GUIDE")
+    with pytest.raises(CrsError, match=r"GUIDE can't be transformed to the coordinate system of the cloud .EPSG:25832"):
+        read_lines_along(guide, parse_crs("EPSG:25832").to_wkt())
+    assert len(read_lines_along(guide, None)) == 2

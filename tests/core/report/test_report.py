@@ -260,6 +260,11 @@ def test_pages_are_as_wide_as_the_window_and_paper_shows_every_column(in_browser
     assert in_browser(html.replace("@media print", "@media screen"), [HIDDEN], PAPER_PX) == [0]
 
 
+def test_a_column_that_is_always_empty_is_left_out():
+    html = table(("Line", "Name", "Why"), [(1, "", "hidden"), (2, "", "")])
+    assert re.findall("<t[hd]>(.*?)</t[hd]>", html) == ["Line", "Why", "1", "hidden", "2", ""]
+
+
 def test_all_text_is_escaped():
     nasty = '<script>alert("1")</script>&'
     html = page(track(), source=nasty, facts={nasty: nasty})

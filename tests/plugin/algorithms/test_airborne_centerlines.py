@@ -64,4 +64,6 @@ def test_lines_stations_and_report_from_guides_in_degrees(flown, run_step, tmp_p
     stations = list(QgsVectorLayer(str(outputs["STATIONS"]), "stations").getFeatures())
     assert len(stations) == done.results["GUIDE_LENGTH"] / 10
     assert {station["seen"] for station in stations if station["reason"] == ""} == {1}
-    assert "Good" in (tmp_path / "report.html").read_text(encoding="utf-8")
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    for words in ("Good", 'aria-label="Map of the tracks"', "<dt>Date</dt>", f"<dd>{CRS} - "):
+        assert words in page
