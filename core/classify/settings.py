@@ -63,7 +63,7 @@ class Tolerances:
 
 
 HEADS = Band(low_m=LOW_M, depth_share=1.0, slab_m=0.025)
-BURIED = Band(low_m=0.04, depth_share=0.4, slab_m=0.012)
+BURIED = Band(low_m=0.04, depth_share=0.4, slab_m=0.012, shadows=False)
 """Tops of rails, and those of rails that are buried up to the head. A smooth surface shows these, too; a rough one has
 as much relief anywhere."""
 

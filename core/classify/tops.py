@@ -20,6 +20,9 @@ WINDOW_M = 0.26
 DEPTH_M = 0.045
 """Cells up to this far below a top count as part of it: the height of a head."""
 
+AROUND_M = 0.08
+"""Half the side of the window that shows the density with which a top is seen: a head, and a cell on either side."""
+
 MAX_SHARE = 0.50
 """Largest share of the other seen cells of the window that the top may fill: a rail fills 0.14 to 0.25, with its foot
 or a guard rail 0.38, ballast and kerbs half and more."""
@@ -43,11 +46,14 @@ class Band:
         Cells that are lower by this share of the height, or by `DEPTH_M` if that is less, are not part of the top.
     slab_m : float
         Tops are compared with their surroundings at thresholds this far apart.
+    shadows : bool
+        Whether rails hide what is behind them: not in a cloud that is matched from images.
     """
 
     low_m: float
     depth_share: float
     slab_m: float
+    shadows: bool = True
 
     def depth_m(self, height_m: np.ndarray | float) -> np.ndarray | float:
         """Return the depth below a top down to which cells are part of it, metres, by its height above the bed."""
@@ -156,16 +162,20 @@ def narrow_tops(tops: Tops, band: Band) -> np.ndarray:
     candidates = np.flatnonzero((top >= band.low_m * MILLIMETRES) & ~_around(tops.high).ravel())
     if not len(candidates):
         return candidates
-    window = Window(tops.grid, candidates, round(WINDOW_M / tops.grid.cell_m))
-    seen = window.sums(tops.seen)
+    window, around = (
+        Window(tops.grid, candidates, round(half_m / tops.grid.cell_m)) for half_m in (WINDOW_M, AROUND_M)
+    )
+    seen = window.sums(tops.seen).astype(int) - 1
+    larger = (window.size - 1) / (around.size - 1) if band.shadows else 0.0
     slab = (top[candidates] - round(band.low_m * MILLIMETRES)) // round(band.slab_m * MILLIMETRES)
     share = np.zeros(len(candidates))
     for number in np.unique(slab).tolist():
         middle_m = band.low_m + (number + 0.5) * band.slab_m
         threshold = (middle_m - band.depth_m(middle_m)) * MILLIMETRES
         chosen = np.flatnonzero(slab == number)
-        others = window.of(chosen).sums((tops.top >= threshold) | tops.high) - 1
-        share[chosen] = others / np.maximum(seen[chosen] - 1, 1)
+        high = (tops.top >= threshold) | tops.high
+        others, near = (one.of(chosen).sums(high).astype(int) - 1 for one in (window, around))
+        share[chosen] = others / np.maximum(np.maximum(seen[chosen], larger * near), 1)
     return candidates[share <= MAX_SHARE]
 
 
@@ -186,13 +196,18 @@ class Window:
     cell: np.ndarray
     reach: int
 
+    @property
+    def size(self) -> int:
+        """Number of cells in a window."""
+        return (2 * self.reach + 1) ** 2
+
     def of(self, chosen: np.ndarray) -> Window:
         """Choose some of the windows."""
         return Window(self.grid, self.cell[chosen], self.reach)
 
     def sums(self, image: np.ndarray) -> np.ndarray:
         """Sum an image of whole numbers in each window, (k,)."""
-        kind = np.min_scalar_type((2 * self.reach + 1) ** 2) if image.dtype == bool else np.int32
+        kind = np.min_scalar_type(self.size) if image.dtype == bool else np.int32
         across = _sums_along(image.astype(kind), self.reach, 1)
         return _sums_along(across, self.reach, 0).ravel()[self.cell]
 

@@ -52,6 +52,11 @@ rails. The faces of a head end at 37 mm on 60E1, and at 45 mm on the tallest hea
 NOISE_SIGMAS = 2.0
 """Standard deviations of the noise of heights by which points on the lower ends of faces may be deeper."""
 
+FOUND_HEAD_M, FOUND_SIGMAS = 0.036, 5.0
+"""Depth below the crown of what was found in a raw cloud, and standard deviations of the noise if they are more, as in
+clouds from the air. The search takes all of the web down to 50 mm below the top where a rail is seen from the side. It
+shows right below the face, next to the axis: a line would take it for its crown. The lowest part of a face may go."""
+
 FULL_SHARE = 0.5
 """Points in the crown as a share of those in the fullest part of the head: a scanner to one side sees more of the face
 than of the crown above it."""
@@ -123,20 +128,25 @@ def heads_of(points: RailPoints) -> RailPoints:
     """
     if points.found and points.blunt:
         return points
-    kept = on_heads(points.xyz)
+    kept = on_heads(points.xyz, points.found)
     return points if kept.all() else points.kept(kept)
 
 
-def on_heads(xyz: np.ndarray) -> np.ndarray:
-    """Return which points of rails are not below a head, (n,) bool, given (n, 3) local metres."""
+def on_heads(xyz: np.ndarray, found: bool = False) -> np.ndarray:
+    """Return which points of rails are not below a head, (n,) bool, given (n, 3) local metres.
+
+    They are those of a class, or those that were `found` in a raw cloud.
+    """
     if not len(xyz):
         return np.zeros(0, dtype=bool)
     cell = np.floor(xyz[:, :2] / PLACE_M).astype(np.int64)
     _, first, place = np.unique(cell @ [1 << 32, 1], return_index=True, return_inverse=True)
     place = place.ravel()
     places, crown, noise_m = _seen_at(xyz[first, :2], xyz[_thinned(place)])
-    depth_m = _course(places, crown)[place] - xyz[:, 2]
-    return ~((depth_m > HEAD_M + NOISE_SIGMAS * noise_m) & (depth_m <= RAIL_M))
+    level, slope = _course(places, crown)
+    depth_m = level[place] + slope[place] * places.along(place, xyz[:, :2] - places.xy[place]) - xyz[:, 2]
+    head_m = max(FOUND_HEAD_M, FOUND_SIGMAS * noise_m) if found else HEAD_M + NOISE_SIGMAS * noise_m
+    return ~((depth_m > head_m) & (depth_m <= RAIL_M))
 
 
 def _thinned(place: np.ndarray) -> np.ndarray:
@@ -204,8 +214,8 @@ def _windows(place: np.ndarray, z: np.ndarray) -> np.ndarray:
     return np.searchsorted(key, key + CROWN_M, side="right")
 
 
-def _course(places: Places, crown: np.ndarray) -> np.ndarray:
-    """Return the heights of heads at places, (p,) metres, from what the places along their rails show.
+def _course(places: Places, crown: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the heights of heads at places, metres, and their slopes, (p,) each, as the places along their rails show.
 
     Around each place, the straight line with the least sum of deviations is fitted: it does not follow what stands on
     a rail or hides its head for less than half of the way. NaN where the places do not agree.
@@ -224,4 +234,4 @@ def _course(places: Places, crown: np.ndarray) -> np.ndarray:
         off_m = np.abs(z - level[own] - slope[own] * way)
         weight = 1 / np.maximum(off_m, LEAST_OFF_M)
     agree = np.bincount(own, off_m <= AGREE_M, size)
-    return np.where(agree >= MIN_AGREE * count, middle + level, np.nan)
+    return np.where(agree >= MIN_AGREE * count, middle + level, np.nan), slope

@@ -16,8 +16,9 @@ PARTNER_M = (0.6, 1.8)
 MAX_TILT = 0.2
 """Largest slope across of a track: cant of 300 mm on standard gauge."""
 
-WINDOW = 33
-"""Stations over which the slope is averaged, 8.25 m: a ramp of cant of 1 in 400 turns a track by 0.014 over it."""
+WINDOW = 121
+"""Stations over which the slope is averaged, 30 m: errors of dense matching are alike over 1 to 10 m, and turn a track
+by 0.02. Where a ramp of cant of 1 in 400 begins, the mean is off by 0.006."""
 
 
 def tilts(line: np.ndarray, places: np.ndarray, normals: np.ndarray, level: np.ndarray, step_m: float) -> np.ndarray:

@@ -116,7 +116,7 @@ class Match:
         """Compare lines and truth that are at most this distance apart in plan."""
         there, back = self.there.within(tolerance_m), self.back.within(tolerance_m)
         return Comparison(
-            completeness=there.length_m / self.there.length_m if self.truth_count else np.nan,
+            completeness=there.length_m / self.there.length_m if self.there.length_m else np.nan,
             correctness=back.length_m / self.back.length_m if len(self.line) else 0.0,
             lateral_rmse_m=_worse(_rms(there.lateral), _rms(back.lateral)),
             lateral_p95_m=_worse(_p95(there.lateral), _p95(back.lateral)),
@@ -126,7 +126,7 @@ class Match:
             height_bias_m=_worse(_mean(there.height), _mean(back.height)),
             line_count=self.line_count,
             truth_count=self.truth_count,
-            length_ratio=self.back.length_m / self.there.length_m if self.truth_count else np.nan,
+            length_ratio=self.back.length_m / self.there.length_m if self.there.length_m else np.nan,
         )
 
     def wrong_m(self, tolerance_m: float = 0.05) -> float:

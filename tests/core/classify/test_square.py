@@ -43,6 +43,19 @@ def test_a_thin_cloud_is_labelled():
     assert found.figures.thin == 1
 
 
+def test_rails_are_labelled_where_next_to_nothing_of_the_ground_is_seen():
+    """At grazing angles a scanner sees one face of each rail, and shadow behind it."""
+    rng = np.random.RandomState(3)
+    xyz, on = ballasted(rng, size=12.0)
+    left = turned(xyz, 0.3)[1]
+    face = on & (left - np.sign(left) * SPACING / 2 < -0.015)
+    seen = face | (rng.random_sample(len(xyz)) < 0.02)
+    xyz, on = xyz[seen], on[seen]
+    found = classify_square(xyz, SETTINGS).rail
+    assert (found & on)[inner(xyz, 10)].sum() / on[inner(xyz, 10)].sum() > 0.95
+    assert (found & on).sum() / found.sum() > 0.95
+
+
 def test_canted_rails_on_their_canted_bed():
     rng = np.random.RandomState(4)
     xyz, on = ballasted(rng)

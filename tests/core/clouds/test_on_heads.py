@@ -21,7 +21,8 @@ def rail(length_m, per_m=150, seed=0, noise_m=0.002, across_m=0.0, gradient=0.0)
     low, high = (np.choose(part, bounds) for bounds in ([-0.03, -0.13, -0.17, -0.18], [0.0, -0.06, -0.15, -0.175]))
     top = (part == HEAD) & (random.random(n) < 0.6)
     z = np.where(top, 0.0, random.uniform(low, high)) + gradient * x + random.normal(0, noise_m, n)
-    return np.column_stack([x, across_m + random.uniform(-half, half), z]), part
+    y = np.where((part == HEAD) & ~top, random.choice([-0.036, 0.036], n), random.uniform(-half, half))
+    return np.column_stack([x, across_m + y + random.normal(0, noise_m, n), z]), part
 
 
 @pytest.mark.parametrize("gradient", [0.0, 0.04])
@@ -50,9 +51,11 @@ def test_a_rail_far_beside_the_scanner_shows_its_web_as_well_as_its_head():
     xyz = np.column_stack([x, across, z + random.normal(0, 0.002, 6000)])
     crown = (z > -0.005) & (random.random(6000) < 0.8)
     xyz[crown, 1] = random.uniform(-0.03, 0.03, crown.sum())
-    kept = on_heads(xyz)
+    kept, found = on_heads(xyz), on_heads(xyz, found=True)
     assert kept[z > -0.035].mean() > 0.99
     assert not kept[z < -0.07].any()
+    assert found[z > -0.02].mean() > 0.99
+    assert found[(z < -0.045) & (z > -0.06)].mean() < 0.3 * kept[(z < -0.045) & (z > -0.06)].mean()
 
 
 @pytest.mark.parametrize("share", [0.1, 0.5])

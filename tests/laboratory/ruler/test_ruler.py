@@ -74,6 +74,12 @@ def test_the_share_within_sigma_uses_the_standard_error_of_each_place():
     assert found.share_within(np.where(found.t < 25, 0.013, 0.0)) == pytest.approx(1 / 3, abs=0.001)
 
 
+def test_nothing_that_is_to_be_found_has_no_share():
+    found = match([straight(left=0.004)], [straight()])
+    none = found.where(np.zeros(len(found.there.distance), dtype=bool), np.zeros(len(found.line), dtype=bool))
+    assert np.isnan(none.within(0.05).completeness)
+
+
 def test_gauge_and_cant_are_measured_along_the_track():
     truth = [straight(left=0.75), straight(left=-0.75)]
     lines = [straight(left=0.753, up=0.004), straight(left=-0.75)]
