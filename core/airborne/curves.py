@@ -18,7 +18,6 @@ from .search import parallel
 LITTLE = 1e-12
 """Added to the diagonal, so that a matrix without any data can be solved."""
 
-
 STRAIGHT_M = 0.004
 """Standard deviation of the third differences of a track in plan, over 10 m, where its curvature does not change."""
 

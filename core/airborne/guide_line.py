@@ -21,7 +21,6 @@ LONG_RUN = 2.0
 SMOOTHED_M = 4.0
 """Standard deviation of the smoothing of a guide, which rounds its kinks; a curve of 300 m radius moves by 3 cm."""
 
-
 SECTION_M = 5.0
 """Length over which the level of the bed is taken."""
 

@@ -42,7 +42,6 @@ AREA_M = 200.0
 ROW = 2**31
 """Cells in a row, so that one number stands for a cell."""
 
-
 POINT = np.dtype([("xyz", "<f8", 3), ("mark", "<u4")])
 """A point on disk: metres from the zero of the coordinate system, and its mark, see `passes.marks_of`."""
 

@@ -36,12 +36,7 @@ FEW_GUIDES = 5
 
 
 def refuse_mobile(density: float) -> None:
-    """Refuse a cloud with this many points per square metre if single railheads show in it.
-
-    Raises
-    ------
-    CloudError
-    """
+    """Raise `CloudError` for a cloud in whose points per square metre single railheads show."""
     if density > MOBILE_DENSITY:
         raise CloudError(
             f"The cloud has {density:.0f} points per square metre, as mobile lidar and dense drone surveys have: use "

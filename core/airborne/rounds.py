@@ -26,7 +26,6 @@ SLOPE_M = 0.017
 COURSE_M = 0.12
 """Standard error of the places of a course."""
 
-
 SHIFT_LENGTH_M, STRIP_SHIFT_M = 50.0, 0.1
 """Length of the sections in which strips are fitted alone, and standard deviation of the shift between two strips."""
 

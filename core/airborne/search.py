@@ -40,7 +40,6 @@ APART_M = 0.5
 IMPOSSIBLE = -1e9
 """Score of a place where no course runs: below every sum of scores."""
 
-
 FAR_M, NEAR_M, PARALLEL = 13.0, 2.5, 0.995
 """Guides this far apart at most, and this far at least, are those of one line where the cosine of their angle is
 larger."""

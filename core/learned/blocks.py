@@ -37,7 +37,6 @@ from the air are then almost equally dense; the ground and what stands higher ar
 SHUFFLE_SEED = 20_20
 """Of the order in which points are dropped from layer to layer: random, but the same for the same points."""
 
-
 NEIGHBOURS = 16
 """Nearest points that each point looks at, itself included; Hu et al. use as many."""
 

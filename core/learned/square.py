@@ -34,7 +34,6 @@ NEAREST = 3
 NEAREST_M = 0.001
 """Smaller distances count as this one: a point that the network has seen keeps its probability."""
 
-
 LEVEL_M = 1.0
 """Labelled points this far apart in height may be on one line: on the decks of bridges and below them they are not."""
 
