@@ -34,7 +34,7 @@ JOB = declaration.Job(
     "OpenCV. With the smaller network, which is the default, a run on the sample takes as long with OpenCV. The "
     "download is about 200 MB for the processor and several GB for an Nvidia GPU.\n\n"
     "All files are compared with a list of checksums in the plugin, except the builds that only PyTorch's own index "
-    "has, CPU on Linux and CUDA on Windows: they are compared with the checksums of that index.",
+    "has, for processors on Linux and Nvidia GPUs on Windows: they are compared with the checksums of that index.",
     ("rail", "setup", "install", "python", "pip", "dependencies", "laspy", "opencv", "torch", "pytorch"),
     parameters=(
         Choice(
