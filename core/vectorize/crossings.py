@@ -9,6 +9,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 import numpy as np
+from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from ..lines.ends import Bridge, bridge, cut_back, even_points
@@ -18,6 +19,9 @@ from .junctions import DIRECTION_M, ends_by_node, unsteadiness
 MAX_MERGED_M = 14.0
 """Largest length that two crossing rails share. Heads of 76 mm in cells of 40 mm share 9 m at 1:26.5, and wing rails
 lengthen it at both ends."""
+
+TANGLE_M = 2.5
+"""Largest distance from one node of a frog to the next: that of a wing rail's mouth from the tip of the nose at 1:9."""
 
 SKIP_M = 0.5
 """Length of a rail next to the shared part that the other rail still draws aside."""
@@ -41,8 +45,9 @@ def resolve_crossings(network: LineNetwork) -> LineNetwork:
     """Draw two rails through every part that two crossing rails share, each a smooth curve between its own free parts.
 
     A crossing is a node of four lines; or a short line between two nodes of three; or a node of three whose fourth leg
-    ends freely before it, because a flangeway of the frog cuts it off. It is resolved if its four legs form two pairs
-    that rails could follow. The rails then cross without a node.
+    ends freely before it, because a flangeway of the frog cuts it off; or several nodes and ends close together, which
+    four legs leave. It is resolved if its four legs form two pairs that rails could follow. The rails then cross
+    without a node.
 
     Parameters
     ----------
@@ -74,13 +79,33 @@ def _crossings(network: LineNetwork) -> Iterator[tuple[list[int], dict[int, floa
         (lines, {end: SKIP_M for node in nodes for end in at_node[node] if end // 2 not in lines})
         for lines, nodes in places
     ]
-    crossings += [([], legs) for legs in _cut_off(network)]
+    crossings += [([], legs) for legs in _cut_off(network)] + list(_tangled(network))
     for lines, legs in crossings:
         long = all(
             lengths[end // 2] > 3 * SKIP_M and lengths[end // 2] > skip_m + SKIP_M for end, skip_m in legs.items()
         )
         if len({end // 2 for end in legs}) == 4 and long:
             yield lines, legs
+
+
+def _tangled(network: LineNetwork) -> Iterator[tuple[list[int], dict[int, float]]]:
+    """Yield the crossings whose wing rails, flangeways and nose are several nodes in the raster: four legs leave them.
+
+    Such nodes, and ends, are at most `TANGLE_M` from the next one.
+    """
+    lengths = network.lengths()
+    nodes = np.flatnonzero(network.degrees() != 2)
+    if not len(nodes):
+        return
+    tree = cKDTree(network.nodes[nodes])
+    near = tree.sparse_distance_matrix(tree, TANGLE_M, output_type="coo_matrix")
+    tangle = np.full(len(network.nodes), -1)
+    tangle[nodes] = connected_components(near, directed=False)[1]
+    own = tangle[network.ends]
+    within = (own[:, 0] == own[:, 1]) & (own[:, 0] >= 0) & (lengths < MAX_MERGED_M)
+    for number in np.flatnonzero(np.bincount(own[within, 0], minlength=1) > 1).tolist():
+        legs = np.flatnonzero((own.ravel() == number) & ~np.repeat(within, 2))
+        yield np.flatnonzero(within & (own[:, 0] == number)).tolist(), dict.fromkeys(legs.tolist(), SKIP_M)
 
 
 def _cut_off(network: LineNetwork) -> list[dict[int, float]]:
