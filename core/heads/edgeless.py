@@ -49,13 +49,9 @@ CREST_SIGMA_M = 0.003
 """Standard error of a crest that more points would not reduce: a blur of 4 cm blends a head with ballast that is higher
 by 2 or 3 cm on one side, and an oblique beam with what it sees on its own side of the rail."""
 
-MAX_TILT = 0.06
-"""Slope across of a track that is not known because its other rail is not seen: cant of 90 mm. It moves a crest."""
-
-CREST_BELOW_M = 0.02
-"""Distance of the crest of a blurred head below its top, give or take as much: a beam of half a head lowers it by some
-millimetres, a blur of 4 cm by 4 cm. Where a track has cant, the rail leans, and the crest lies to the side of the top.
-"""
+TILT = 0.035
+"""Standard deviation of the slope across of tracks, whose cant is up to 90 mm. A blurred head does not show it, and its
+crest moves to the higher side, by slope over bend."""
 
 LEANING_M = 0.008
 """Standard deviation of the mean of the points about the crest: labels lean to the side on which the bed is higher.
@@ -141,8 +137,7 @@ class Ridge:
         if not points.is_blunt or not len(near.t):
             return None
         row, rows = near.station, len(near.stations)
-        tilt = np.full(rows, np.nan) if near.tilt is None else near.tilt
-        x, up = _upright(near.across, near.z - rough_level(near.t, near.z), np.nan_to_num(tilt)[row])
+        x, up = near.across, near.z - rough_level(near.t, near.z)
         used = np.ones(len(x), dtype=bool)
         for _ in range(SLOPE_ROUNDS):
             bend = max(-2 * float(np.polynomial.polynomial.polyfit(x[used], up[used], 2)[2]), MIN_BEND)
@@ -150,13 +145,7 @@ class Ridge:
             noise_m = robust_sigma(flat[used])
             level, slope, crest, information = _crests(row[used], rows, x[used], flat[used], bend, noise_m)
             used = np.abs(flat - level[row] - slope[row] * x) <= OFF_TOP_SIGMAS * noise_m
-        unsure_m = np.where(np.isnan(tilt), MAX_TILT / bend, CREST_BELOW_M * np.abs(tilt))
-        return cls(near.stations, crest, information, np.hypot(CREST_SIGMA_M, unsure_m))
-
-
-def _upright(left: np.ndarray, up: np.ndarray, tilt: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Turn points about their top, by offsets and heights, (n,) each, as if the track did not rise to the left."""
-    return left + tilt * (up - CREST_BELOW_M), up - tilt * left
+        return cls(near.stations, crest, information, np.full(rows, np.hypot(CREST_SIGMA_M, TILT / bend)))
 
 
 def _crests(

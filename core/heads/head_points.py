@@ -18,7 +18,6 @@ from ..clouds.points import RailPoints
 from ..polyline import Polyline, interpolate, project
 from ..progress import SILENT, Progress
 from .level import AXIS_SHARE, MIN_NOISE_M, OFF_TOP_SIGMAS, cross_slope, robust_sigma, rough_level
-from .tilt import tilts
 
 STATION_STEP_M = 0.25
 """Spacing of the stations along a line, the centres of the windows: a third of the smoothing's sigma."""
@@ -100,9 +99,6 @@ class HeadPoints:
         See `RailPoints`.
     is_blunt : bool
         Whether the cloud blunts heads: all or none, for one line alone, a centimetre off its head, may look otherwise.
-    tilt : (s,) array or None
-        Rise of the track to the left, by the heights of the rails beside the line, NaN where there is none. None where
-        heads are not blunt: they show the slope of their own tops.
     """
 
     t: np.ndarray
@@ -113,7 +109,6 @@ class HeadPoints:
     free: np.ndarray
     strips: np.ndarray | None = None
     is_blunt: bool = False
-    tilt: np.ndarray | None = None
 
     def __getitem__(self, which: np.ndarray) -> HeadPoints:
         strips = None if self.strips is None else self.strips[which]
@@ -146,14 +141,6 @@ class HeadPoints:
     def within(self, share: float) -> np.ndarray:
         """Return which points are this close to the line, in head widths, (n,) bool."""
         return np.abs(self.across) <= share * self.width_m
-
-    @property
-    def levels(self) -> np.ndarray:
-        """Height of the head at each station, (s,) metres; NaN where too few points are on it."""
-        head = self[self.within(0.5)]
-        if len(head.t) < MIN_ON_HEAD:
-            return np.full(len(self.stations), np.nan)
-        return np.interp(self.stations, head.t, rough_level(head.t, head.z))
 
     @property
     def looks_blunt(self) -> bool:
@@ -261,16 +248,7 @@ def near_lines(
         strip = None if own is None else own[mine]
         heads.append(HeadPoints(feet.t[mine], feet.across[mine], z[mine], width_m, lines[number], free[number], strip))
     is_blunt = _are_blunt(heads) if blunt is None else blunt
-    return _tilted([replace(head, is_blunt=True) for head in heads]) if is_blunt else heads
-
-
-def _tilted(heads: Sequence[HeadPoints]) -> list[HeadPoints]:
-    """Tell lines by how much their tracks rise to the left."""
-    if not heads:
-        return []
-    number, _, places, normals = _stations([head.line for head in heads])
-    rise = tilts(number, places, normals, np.concatenate([head.levels for head in heads]), STATION_STEP_M)
-    return [replace(head, tilt=rise[number == own]) for own, head in enumerate(heads)]
+    return [replace(head, is_blunt=is_blunt) for head in heads]
 
 
 def judged(points: RailPoints, lines: Sequence[np.ndarray], widths: Widths) -> RailPoints:

@@ -84,13 +84,12 @@ def double_track(
     name: str = "double",
     curvature: float = 1 / 700,
     cant_m: float = 0.09,
-    leaning: bool = False,
 ) -> RawScene:
     """Double track in a curve with cant, masts and wires, a trough, plants beside the bed."""
     curve = line(60.0, curvature, 0.35)
     things: list[Thing] = [
         ground,
-        thing(partial(running_rails, leaning=leaning)),
+        running_rails,
         masts_at(-3.4),
         thing(trough, 0, 2.1, 0.0, 60.0),
         thing(plants, 60, (-9.0, -4.5)),

@@ -280,16 +280,13 @@ def rail(
             world.add(across[:, first : last + 2], height[:, first : last + 2], kind, where)
 
 
-def running_rails(world: World, hidden: np.ndarray | None = None, leaning: bool = False) -> None:
-    """Add the rails of all tracks with their fastenings; where heads overlap, rays hit the outline of both.
-
-    They stand upright, or lean as a track with cant does.
-    """
+def running_rails(world: World, hidden: np.ndarray | None = None) -> None:
+    """Add the rails of all tracks with their fastenings; where heads overlap, rays hit the outline of both."""
     laid: list[np.ndarray] = []
     for way in world.ways:
         for side in (1, -1):
             left, top = rail_place(way, side)
-            rail(world, left, top, hidden, lean=np.nan_to_num(np.arcsin(way.slope)) if leaning else 0.0)
+            rail(world, left, top, hidden)
             fasten(world, left, top, laid, hidden)
             laid.append(left)
 
