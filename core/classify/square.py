@@ -229,6 +229,8 @@ def _standing(shown: Shown, settings: Settings) -> Standing:
     found = Candidates.find(shown, band)
     density = _density(shown.bed.coarse, shown.tops.grid.middles(found.marks))
     thin = density < THIN_PER_M2
+    if thin and band.shadows:  # few points fill a strip by chance
+        found = Candidates.find(shown, replace(band, shadows=False))
     tolerances = BLUNT if settings.blunt else THIN if thin else DENSE
     kept = _kept(found, reach_at(density), tolerances, settings)
     if settings.blunt:

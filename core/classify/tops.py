@@ -47,7 +47,7 @@ class Band:
     slab_m : float
         Tops are compared with their surroundings at thresholds this far apart.
     shadows : bool
-        Whether rails hide what is behind them: not in a cloud that is matched from images.
+        Whether what is not seen may be in a shadow: not in a cloud that is matched from images, and not in a thin one.
     """
 
     low_m: float

@@ -46,13 +46,13 @@ def test_a_thin_cloud_is_labelled():
 def test_rails_are_labelled_where_next_to_nothing_of_the_ground_is_seen():
     """At grazing angles a scanner sees one face of each rail, and shadow behind it."""
     rng = np.random.RandomState(3)
-    xyz, on = ballasted(rng, size=12.0)
+    xyz, on = ballasted(rng, size=12.0, per_m2=12_000)
     left = turned(xyz, 0.3)[1]
     face = on & (left - np.sign(left) * SPACING / 2 < -0.015)
-    seen = face | (rng.random_sample(len(xyz)) < 0.02)
+    seen = face | (rng.random_sample(len(xyz)) < 0.004)
     xyz, on = xyz[seen], on[seen]
     found = classify_square(xyz, SETTINGS).rail
-    assert (found & on)[inner(xyz, 10)].sum() / on[inner(xyz, 10)].sum() > 0.95
+    assert (found & on)[inner(xyz, 10)].sum() / on[inner(xyz, 10)].sum() > 0.9
     assert (found & on).sum() / found.sum() > 0.95
 
 
