@@ -144,7 +144,13 @@ def on_heads(xyz: np.ndarray, found: bool = False) -> np.ndarray:
     place = place.ravel()
     places, crown, noise_m = _seen_at(xyz[first, :2], xyz[_thinned(place)])
     level, slope = _course(places, crown)
-    depth_m = level[place] + slope[place] * places.along(place, xyz[:, :2] - places.xy[place]) - xyz[:, 2]
+    # Coordinate by coordinate: all points of a square are in memory beside what is made here.
+    depth_m = level[place]
+    depth_m -= xyz[:, 2]
+    for axis, way in enumerate((np.cos(places.direction), np.sin(places.direction))):
+        step = xyz[:, axis] - places.xy[place, axis]
+        step *= (slope * way)[place]
+        depth_m += step
     head_m = max(FOUND_HEAD_M, FOUND_SIGMAS * noise_m) if found else HEAD_M + NOISE_SIGMAS * noise_m
     return ~((depth_m > head_m) & (depth_m <= RAIL_M))
 
