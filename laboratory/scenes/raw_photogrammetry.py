@@ -47,6 +47,8 @@ class Photogrammetry:
         Mean distance between neighbouring points.
     irregular : float
         Part of this distance by which points lie off a grid.
+    turned_rad : float
+        Angle of this grid to the reference line: the images' rows do not follow a track.
     blur_m : float
         Standard deviation of the smoothing in plan.
     blur_varies : float
@@ -73,6 +75,7 @@ class Photogrammetry:
 
     point_step_m: float = 0.05
     irregular: float = 0.7
+    turned_rad: float = 0.0
     blur_m: float = 0.042
     blur_varies: float = 0.2
     blur_patch_m: float = 1.0
@@ -154,12 +157,8 @@ def survey(world: World, camera: Photogrammetry, rng: np.random.RandomState) -> 
     """Match images of a world."""
     surface = _surface(world, camera)
     length_m, half_m = world.station[-1], world.half_width_m
-    along, across = np.meshgrid(
-        np.arange(0, length_m, camera.point_step_m), np.arange(-half_m, half_m, camera.point_step_m), indexing="ij"
-    )
-    places = np.stack([along.ravel(), across.ravel()]) + camera.point_step_m * (
-        0.5 + camera.irregular * (rng.random_sample((2, along.size)) - 0.5)
-    )
+    grid = _grid(length_m, half_m, camera)
+    places = grid + camera.point_step_m * (0.5 + camera.irregular * (rng.random_sample(grid.shape) - 0.5))
     seen = ~surface.nearest(surface.hidden, *places)
     station, left = places[:, seen]
     patches_m = camera.blur_patch_m, 4 * camera.blur_patch_m
@@ -169,6 +168,24 @@ def survey(world: World, camera: Photogrammetry, rng: np.random.RandomState) -> 
     height = surface.at(station, left, blunt) + size_m * rng.standard_normal(len(station))
     kind, classification = (surface.nearest(values, station, left) for values in (surface.kind, surface.classification))
     return Survey(station, left, height, kind, classification, surface)
+
+
+def _grid(length_m: float, half_m: float, camera: Photogrammetry) -> np.ndarray:
+    """Return the grid of a survey along and to the left of the reference line, (2, n)."""
+    if camera.turned_rad == 0:
+        return _even((0.0, length_m), (-half_m, half_m), camera.point_step_m)
+    reach_m = float(np.hypot(length_m / 2, half_m))
+    cosine, sine = np.cos(camera.turned_rad), np.sin(camera.turned_rad)
+    grid = np.array([[cosine, -sine], [sine, cosine]]) @ _even(
+        (-reach_m, reach_m), (-reach_m, reach_m), camera.point_step_m
+    )
+    return (grid + [[length_m / 2], [0.0]])[:, (np.abs(grid) <= [[length_m / 2], [half_m]]).all(axis=0)]
+
+
+def _even(along_m: tuple[float, float], left_m: tuple[float, float], step_m: float) -> np.ndarray:
+    """Return an even grid, (2, n)."""
+    along, left = np.meshgrid(np.arange(*along_m, step_m), np.arange(*left_m, step_m), indexing="ij")
+    return np.stack([along.ravel(), left.ravel()])
 
 
 def misplaced(xyz: np.ndarray, camera: Photogrammetry, rng: np.random.RandomState) -> np.ndarray:

@@ -215,6 +215,7 @@ def _camera(rng: np.random.RandomState, area_m2: float) -> Photogrammetry:
         drift_m=even_in_log(rng, 0.001, 0.005),
         noise_m=even_in_log(rng, 0.002, 0.008),
         stray_share=even_in_log(rng, 0.001, 0.01),
+        turned_rad=rng.uniform(0.05, np.pi / 4),
     )
 
 

@@ -74,3 +74,10 @@ def test_files_have_what_a_camera_or_a_scanner_gives(camera, tmp_path):
     assert ("red" in cloud.point_format.dimension_names) is of_images
     assert np.asarray(cloud.intensity).any() != of_images
     assert np.array_equal(cloud.classification, scene.classification if of_images else np.ones(len(scene.xyz)))
+
+
+def test_a_turned_grid_shows_as_many_places_in_rows_that_cross_the_track():
+    straight, turned = (surveyed(replace(EXACT, irregular=0.0, turned_rad=turn)) for turn in (0.0, 0.3))
+    assert len(turned.xyz) == pytest.approx(len(straight.xyz), rel=0.01)
+    straight_rows, turned_rows = (len(np.unique(left_of(one, one.xyz).round(3))) for one in (straight, turned))
+    assert straight_rows < 200 < 4000 < turned_rows
