@@ -38,7 +38,7 @@ def _run(values: Values, progress: Progress) -> Result:
     from ..files.layers import lines_layer
     from ..squares.steps import lines_of
     from .area_points import Area, read_points_in
-    from .result import Result
+    from .result import Result, ShownCloud
 
     source, header = values.raster("INPUT"), values.raster("INPUT").header
     rasters, frame, clouds = source.read(progress.span(0, READING / 2)), header.frame, {}
@@ -49,14 +49,17 @@ def _run(values: Values, progress: Progress) -> Result:
         rasters = tuple(moved(raster, header.frame, frame) for raster in rasters)
     else:
         progress.warning("Without POINTS, the rails have no heights and are only as accurate as the raster.")
-    settings = values.settings(_standard(values))
+    standard = _standard(values)
+    settings = values.settings(standard)
     rails: list[RailLine] = []
     shares = progress.span(READING, 1).split(len(rasters))
     for raster, code, share in zip(rasters, header.class_codes, shares):
         found = lines_of(raster, code, clouds.get(code), settings, share, first_id=len(rails) + 1)
         warn_of_rails(found, code, settings, progress)
         rails += found
-    return Result(outputs.figures_of(rails, "RAIL"), frame, {"OUTPUT": lambda: lines_layer(RAILS, rails)})
+    shown = ShownCloud("POINTS", header.class_codes, standard.head_width_m) if clouds else None
+    makers = {"OUTPUT": lambda: lines_layer(RAILS, rails)}
+    return Result(outputs.figures_of(rails, "RAIL"), frame, makers, cloud=shown)
 
 
 def moved(raster: RailRaster, frame: LocalFrame, other: LocalFrame) -> RailRaster:

@@ -32,6 +32,21 @@ class Step:
     why: str = ""
 
 
+CARRIED = ("POINTS", "STANDARD", "GAUGE", "HEAD_WIDTH", "OTHER_GAUGES", "LEAVE_OUT")
+"""Parameters that a chain of steps shares: what one of them was given is proposed in the following ones."""
+
+FOLLOWING = {
+    "rasterizerailpoints": ("Clean the raster…", "frpdfcleanup", {"INPUT": "OUTPUT", "POINTS": "INPUT"}),
+    "frpdfcleanup": ("Vectorize the rails…", "vectorizerails", {"INPUT": "OUTPUT"}),
+    "vectorizerails": ("Build the track centerlines…", "buildtrackcenterlines", {"INPUT": "OUTPUT"}),
+    "buildtrackcenterlines": (
+        *("Measure the track geometry…", "measuretrackgeometry"),
+        {"INPUT": "OUTPUT", "RAILS": "INPUT"},
+    ),
+}
+"""What follows a single step: words, algorithm, and its parameters by outputs and parameters of that step."""
+
+
 def after_failure(dialog: RunDialog, failure: type | None, standard: str) -> Iterator[Step]:
     """Yield what may help after a run that failed.
 
@@ -94,6 +109,29 @@ def _in_other_dialogs(dialog: RunDialog, layers: dict[str, QgsVectorLayer], resu
         values["STANDARD"] = given["STANDARD"]
         name = Path(results["OUTPUT"]).name
         yield Step(f"Extract the rails of {name}…", lambda: dialog.go_on("extractrails", values))
+    if dialog.algorithm().name() == "trainrailclassifier" and results.get("WEIGHTS"):
+        yield from _after_training(dialog, results)
+    if dialog.algorithm().name() in FOLLOWING and results.get("OUTPUT"):
+        yield _following(dialog, results)
+
+
+def _after_training(dialog: RunDialog, results: dict[str, Any]) -> Iterator[Step]:
+    """Yield the classification of a cloud with the new weights, and the page on the training."""
+    standard = dialog.mainWidget().createProcessingParameters()["STANDARD"]
+    values = {"METHOD": "LEARNED", "WEIGHTS": results["WEIGHTS"], "STANDARD": standard}
+    yield Step("Classify a cloud with these weights…", lambda: dialog.go_on("classifyrailpoints", values))
+    card = results.get("CARD")
+    if card:
+        yield Step("Open the page on the training", lambda: QDesktopServices.openUrl(QUrl.fromLocalFile(card)))
+
+
+def _following(dialog: RunDialog, results: dict[str, Any]) -> Step:
+    """Return the step after a single step, with its result, and with what this one and those before were given."""
+    text, name, sources = FOLLOWING[dialog.algorithm().name()]
+    given = dialog.mainWidget().createProcessingParameters()
+    carried = {one: given[one] for one in CARRIED if given.get(one)}
+    found = {one: results.get(source) or given[source] for one, source in sources.items()}
+    return Step(text, lambda: dialog.go_on(name, {**dialog.given, **carried, **found}))
 
 
 def _again(dialog: RunDialog, **changes: Any) -> Callable[[], None]:

@@ -42,6 +42,7 @@ from ..dialog.wording import with_labels
 from ..links import LinkFollower, links
 from ..notices import notices
 from ..paths import is_sample
+from ..writing.run import cloud_of
 from . import preview
 from .help_pictures import PictureFitter
 from .next_steps import Step, after_failure, after_success
@@ -57,6 +58,11 @@ class RunDialog(AlgorithmDialog):
     ----------
     algorithm : QgsProcessingAlgorithm
     parent : QWidget, optional
+
+    Attributes
+    ----------
+    given : dict of str to object
+        Values of the run that this one goes on with, also for parameters that only later steps have.
     """
 
     def __init__(self, algorithm: QgsProcessingAlgorithm, parent: QWidget | None = None) -> None:
@@ -64,6 +70,7 @@ class RunDialog(AlgorithmDialog):
         ignore_wheel(self.mainWidget())
         self._follower = LinkFollower(self.findChild(QTextEdit, "txtLog"))
         self._fitter = PictureFitter(self.findChild(QTextBrowser, "textShortHelp"))
+        self.given: dict[str, Any] = {}
         self._failure: type | None = None
         self._is_preview = False
         self._standard = ""
@@ -172,8 +179,14 @@ class RunDialog(AlgorithmDialog):
     def _remember(self) -> None:
         """Keep the standard for the next dialog."""
         wrappers = self.mainWidget().wrappers
-        if "STANDARD" in wrappers and not ("INPUT" in wrappers and _is_of_sample(wrappers["INPUT"].parameterValue())):
+        if "STANDARD" in wrappers and not self._is_demonstration():
             wrappers["STANDARD"].remember()
+
+    def _is_demonstration(self) -> bool:
+        """Return whether the run has to do with the sample, also if only the steps before it had."""
+        wrappers = self.mainWidget().wrappers
+        inputs = [wrappers[name].parameterValue() for name in ("INPUT", "POINTS") if name in wrappers]
+        return any(_is_of_sample(value) for value in (*inputs, self.given.get("POINTS")))
 
     def _offer(self, step: Step) -> None:
         """Offer a step in the message bar."""
@@ -236,9 +249,12 @@ class _Panel(ParametersPanel):
 
 
 def _is_of_sample(value: Any) -> bool:
-    """Return whether the value of an input is the sample: its path, or a layer of it."""
+    """Return whether the value of an input is the sample: its path, a layer of it, or one that a run made of it."""
     layer = QgsProject.instance().mapLayer(value) if isinstance(value, str) else None
-    return is_sample(layer.source() if layer is not None else str(value or ""))
+    if layer is None:
+        return is_sample(str(value or ""))
+    cloud = cloud_of(layer)
+    return is_sample(layer.source()) or any(map(is_sample, cloud.paths if cloud else ()))
 
 
 def _heading(title: str) -> QLabel:
@@ -251,6 +267,7 @@ def open_dialog(name: str, values: dict[str, Any], parent: QWidget | None = None
     """Open the dialog of an algorithm of the plugin with values filled in."""
     algorithm = QgsApplication.processingRegistry().createAlgorithmById(f"railextract:{name}")
     dialog = RunDialog(algorithm, parent)
+    dialog.given = values
     dialog.setParameters(values)
     dialog.show()
     return dialog

@@ -67,13 +67,24 @@ class Session:
 @pytest.fixture(scope="session")
 def raw_cloud(tmp_path_factory):
     """A raw cloud of 12 m of track that states no coordinate system."""
-    path = tmp_path_factory.mktemp("clouds") / "raw.las"
-    xyz = strip(12.0).xyz + [500_000.0, 3_000_000.0, 100.0]
+    return _written(tmp_path_factory.mktemp("clouds") / "raw.las", 12.0, rail_class=1)
+
+
+@pytest.fixture(scope="session")
+def labelled_cloud(tmp_path_factory):
+    """A cloud of 40 m of track whose points on heads have class 10."""
+    return _written(tmp_path_factory.mktemp("clouds") / "labelled.las", 40.0, rail_class=10)
+
+
+def _written(path: Path, length_m: float, rail_class: int) -> Path:
+    """Write a strip of track, with a class for the points on heads."""
+    track = strip(length_m)
+    xyz = track.xyz + [500_000.0, 3_000_000.0, 100.0]
     header = laspy.LasHeader(point_format=6, version="1.4")
     header.scales, header.offsets = [0.001] * 3, xyz[0]
     cloud = laspy.LasData(header)
     cloud.xyz = xyz
-    cloud.classification = np.full(len(xyz), 1, dtype=np.uint8)
+    cloud.classification = np.where(track.head, rail_class, 1).astype(np.uint8)
     cloud.write(path)
     return path
 
@@ -88,7 +99,7 @@ def blunt_cloud(tmp_path_factory):
 
 
 @pytest.fixture(scope="session")
-def run_scenario(tmp_path_factory, raw_cloud, blunt_cloud):
+def run_scenario(tmp_path_factory, raw_cloud, blunt_cloud, labelled_cloud):
     """Run a scenario, once: tests share what it found. One that goes on has the profile of another one."""
     programs = {name: shutil.which(name) for name in ("qgis", "xvfb-run")}
     if not all(programs.values()) or "QGIS_PROCESS" not in os.environ:
@@ -109,6 +120,7 @@ def run_scenario(tmp_path_factory, raw_cloud, blunt_cloud):
             "RAIL_EXTRACT_SAMPLE": str(ROOT / "resources" / "sample" / "sample.laz"),
             "RAIL_EXTRACT_RAW": str(raw_cloud),
             "RAIL_EXTRACT_BLUNT": str(blunt_cloud),
+            "RAIL_EXTRACT_LABELLED": str(labelled_cloud),
             "RAIL_EXTRACT_ZIP": str(ROOT / "build" / "rail_extract.zip"),
         }
         for name in ("QGIS_PLUGINPATH", "QGIS_CUSTOM_CONFIG_PATH"):

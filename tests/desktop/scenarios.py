@@ -18,8 +18,10 @@ from qgis.core import (
     QgsLayerTree,
     QgsPointCloudLayer,
     QgsPointXY,
+    QgsProcessingContext,
     QgsProcessingFeatureSourceDefinition,
     QgsProcessingParameterEnum,
+    QgsProcessingUtils,
     QgsProject,
     QgsRectangle,
     QgsSettings,
@@ -49,7 +51,9 @@ from qgis.PyQt.QtWidgets import (
 )
 from qgis.utils import iface, loadPlugin, plugins, reloadPlugin, startPlugin, unloadPlugin
 
-RAW, BLUNT, SAMPLE, ARCHIVE = (os.environ[f"RAIL_EXTRACT_{name}"] for name in ("RAW", "BLUNT", "SAMPLE", "ZIP"))
+RAW, BLUNT, LABELLED, SAMPLE, ARCHIVE = (
+    os.environ[f"RAIL_EXTRACT_{name}"] for name in ("RAW", "BLUNT", "LABELLED", "SAMPLE", "ZIP")
+)
 NAMES = (
     *("extractrails", "classifyrailpoints", "growrailpoints", "airbornecenterlines"),
     *("rasterizerailpoints", "frpdfcleanup", "vectorizerails"),
@@ -66,6 +70,14 @@ PART = {
 
 ON_RAIL, BESIDE = QgsPointXY(500006.0, 3000000.754), QgsPointXY(500006.0, 3000000.0)
 """A place on a rail of the raw cloud, from which a click may be 0.1 m off, and one half a gauge away."""
+
+FOLLOWING = {
+    "frpdfcleanup": "Clean the raster",
+    "vectorizerails": "Vectorize the rails",
+    "buildtrackcenterlines": "Build the track centerlines",
+    "measuretrackgeometry": "Measure the track geometry",
+}
+"""Algorithms by the links that lead to them, from one single step to the next."""
 
 POOL_S = 35.0
 """Time after which Qt has ended the thread of a run: 30 s without work, and some more."""
@@ -796,6 +808,69 @@ def _click(place: QgsPointXY) -> Iterator:
     pos = QPoint(round(pixel.x()), round(pixel.y()))
     later(partial(QTest.mouseClick, canvas.viewport(), Qt.MouseButton.LeftButton, pos=pos))
     yield 0.5
+
+
+def steps(driver: Driver) -> Iterator:
+    """Go from the sample to the track geometry by the links that single steps offer."""
+    yield from install(ARCHIVE)
+    own = sys.modules["rail_extract.rail_extract_plugin.paths"].SAMPLE / "sample.laz"  # that of the menu
+    dialog = yield from open_dialog("rasterizerailpoints")
+    dialog.setParameters({"INPUT": str(own), "STANDARD": PART["STANDARD"], "EXTENT": PART["EXTENT"]})
+    proposed = {}
+    for name, text in FOLLOWING.items():
+        yield from press_run(dialog)
+        _follow(dialog.findChild(QTextEdit, "txtLog"), text)
+        yield from close(dialog)
+        dialog = yield lambda name=name: next((one for one in _dialogs() if one.algorithm().name() == name), None)
+        proposed[name] = _proposed(dialog)
+        driver.keep("proposed", proposed)
+        driver.picture(f"steps_{name}")
+    driver.keep("log", (yield from press_run(dialog)))
+    driver.keep("stations", dialog.results()["STATION_COUNT"])
+    driver.picture("steps_measured")
+    yield from close(dialog)
+    rails = next(one for one in QgsProject.instance().mapLayers().values() if one.name().startswith("Rails"))
+    dialog = yield from open_dialog("buildtrackcenterlines")
+    dialog.setParameters({"INPUT": rails.id(), "STANDARD": PART["STANDARD"]})
+    yield from press_run(dialog)
+    yield from close(dialog)
+    driver.keep("standard that is remembered", QgsSettings().value("rail_extract/standard"))
+
+
+def _proposed(dialog: QWidget) -> dict[str, str]:
+    """Return what a dialog proposes for its inputs, with layers by their names."""
+    wrappers = dialog.mainWidget().wrappers
+    values = {
+        one: wrappers[one].parameterValue() for one in ("INPUT", "RAILS", "POINTS", "STANDARD") if one in wrappers
+    }
+    context = QgsProcessingContext()
+    context.setProject(QgsProject.instance())
+    layers = {one: QgsProcessingUtils.mapLayerFromString(str(value), context) for one, value in values.items()}
+    return {one: layers[one].name() if layers[one] else value for one, value in values.items()}
+
+
+def train(driver: Driver) -> Iterator:
+    """Train for an epoch on a cloud with a class of rails, and follow the links to the page and to the use of it."""
+    yield from install(ARCHIVE)
+    driver.keep("able", algorithm("trainrailclassifier").canExecute()[0])
+    if not driver.results["able"]:
+        return
+    browser = Browser()
+    dialog = yield from open_dialog("trainrailclassifier")
+    dialog.setParameters({"INPUT": LABELLED, "EPOCHS": 1, "DEVICE": "CPU"})
+    driver.keep("log", (yield from press_run(dialog)))
+    driver.picture("trained")
+    _follow(dialog.findChild(QTextEdit, "txtLog"), "Open the page")
+    yield 0.5
+    driver.keep("opened", browser.urls)
+    _follow(dialog.findChild(QTextEdit, "txtLog"), "Classify a cloud")
+    onwards = yield lambda: next((one for one in _dialogs() if one.algorithm().name() == "classifyrailpoints"), None)
+    fields = onwards.mainWidget().wrappers
+    driver.keep("weights", fields["WEIGHTS"].parameterValue() == dialog.results()["WEIGHTS"])
+    driver.keep("method", fields["METHOD"].parameterValue())
+    driver.picture("trained_classify")
+    yield from close(onwards)
+    yield from close(dialog)
 
 
 def batch(driver: Driver) -> Iterator:

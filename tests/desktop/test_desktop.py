@@ -9,7 +9,7 @@ from osgeo import gdal, ogr
 
 SCENARIOS = (
     *("dialogs", "wheel", "unload", "raw", "missing", "rails", "welcome"),
-    *("review", "reopened", "again", "tried", "onwards", "growing", "batch", "model"),
+    *("review", "reopened", "again", "tried", "onwards", "growing", "steps", "train", "batch", "model"),
 )
 
 DIES_AT_EXIT = ("rails", 340)
@@ -292,6 +292,30 @@ def test_the_toolbar_says_in_which_cloud_rails_grow_and_where_they_need_not(run_
     session = run_scenario("growing")
     assert Path(session["cloud in the toolbar"]).name == "raw.las"
     assert session["said of the sample"].startswith("This cloud has points of class 10")
+
+
+def test_single_steps_lead_from_the_cloud_to_the_track_geometry(run_scenario):
+    session = run_scenario("steps")
+    proposed = session["proposed"]
+    assert proposed["frpdfcleanup"]["INPUT"] == "Rail raster: sample"
+    assert proposed["vectorizerails"]["INPUT"] == "Cleaned rail raster: sample"
+    assert Path(proposed["vectorizerails"]["POINTS"]).name == "sample.laz"
+    pairing = proposed["buildtrackcenterlines"]
+    assert (pairing["INPUT"], pairing["STANDARD"]) == ("Rails: sample", "IN_75R_1000")
+    last = proposed["measuretrackgeometry"]
+    assert (last["INPUT"], last["RAILS"]) == ("Track centerlines: sample", "Rails: sample")
+    assert (Path(last["POINTS"]).name, last["STANDARD"]) == ("sample.laz", "IN_75R_1000")
+    assert session["stations"] > 50
+    assert session["standard that is remembered"] is None  # as that of a demonstration
+
+
+def test_a_training_leads_to_its_page_and_to_the_use_of_its_weights(run_scenario):
+    session = run_scenario("train")
+    if not session["able"]:
+        pytest.skip("It needs PyTorch, of which some Pythons have no build.")
+    (opened,) = session["opened"]
+    assert opened.endswith("CARD.html")
+    assert (session["weights"], session["method"]) == (True, "LEARNED")
 
 
 def test_batch_writes_what_is_named_and_skips_what_is_blank(run_scenario):
