@@ -166,12 +166,14 @@ def open_batch(name: str) -> Iterator:
 
 def press_run(dialog: QWidget) -> Iterator:
     """Press Run and wait for the end; returns the log."""
-    button = dialog.buttonBox().button(QDialogButtonBox.StandardButton.Ok)
+    button, log = dialog.buttonBox().button(QDialogButtonBox.StandardButton.Ok), dialog.findChild(QTextEdit, "txtLog")
+    before = log.toPlainText()
     later(button.click)
-    yield lambda: not button.isEnabled()
+    # A run may end between two looks at the button; its log stays.
+    yield lambda: not button.isEnabled() or log.toPlainText() != before
     yield button.isEnabled
     yield 0.5
-    return dialog.findChild(QTextEdit, "txtLog").toPlainText()
+    return log.toPlainText()
 
 
 def close(dialog: QWidget) -> Iterator:
