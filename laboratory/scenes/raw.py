@@ -160,7 +160,7 @@ def placed(line: Curve, station: np.ndarray, left: np.ndarray, height: np.ndarra
     return np.column_stack([xy + left[:, None] * normal, height])
 
 
-def crests_of(rails: Sequence[np.ndarray], line: Curve, surface: Surface, blur_m: float) -> tuple[np.ndarray, ...]:
+def crests_of(rails: tuple[np.ndarray, ...], line: Curve, surface: Surface, blur_m: float) -> tuple[np.ndarray, ...]:
     """Lay rails, (k, 3) each, as far below their tops as the blur of a surface lowers them.
 
     Where another rail is within `BLENDED` of the blur, in a switch, the surface is one ridge of both, higher than
