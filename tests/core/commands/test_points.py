@@ -138,20 +138,10 @@ def test_only_the_track_along_the_guide_is_classified(save, tmp_path, capsys, le
     assert ("No track has the guide within 0.5 m of its middle" in capsys.readouterr().err) == (not found)
 
 
-def test_a_guide_across_the_tracks_is_noticed(save, tmp_path, capsys):
-    guide = geojson(tmp_path / "guide.json", along_track(angle=1.8))
-    options = ["--guide", guide, "--crs", "EPSG:32632"]
-    assert main(["classify", str(save(scene()[0])), "--output", str(tmp_path / "new.las"), *options]) == 0
-    assert "The guide crosses the tracks: " in capsys.readouterr().err
-
-
 @pytest.mark.parametrize(
     ("options", "message"),
     [
         (["--only-guided"], "--only-guided needs lines to compare tracks with: choose --guide."),
-        (["--workers", "-1"], "--workers can't be -1: give a number from 0 to 1,000."),
-        (["--workers", "1001"], "--workers can't be 1001: give a number from 0 to 1,000."),
-        (["--rail-class", "256"], "--rail-class can't be 256: give a number from 0 to 255."),
         (["--guide", "nothing.json"], "nothing.json can't be read as a vector file: give a GeoPackage or GeoJSON"),
         (["--guide", "far.json"], "The guide has no line within 4 m of the cloud: check its place and coordinate"),
         (["--guide", "empty.json"], "--guide has no lines: give a line layer."),
@@ -233,10 +223,6 @@ def test_rails_grow_and_are_extracted_in_one_call(save, tmp_path):
         (["--seed", "5"], '--seed "5" should be two numbers: x,y.'),
         (["--seed", "nan,5"], '--seed "nan,5" should be two numbers: x,y.'),
         (["--seed", "1e300,5"], '--seed "1e300,5" should be two numbers: x,y.'),
-        (["--seed", "1,2"], "No seed is in the cloud"),
-        (["--seed", f"{X},{Y}", "--max-outliers", "-1"], "--max-outliers can't be -1: give a number from 0 to 1,000."),
-        (["--seed", f"{X},{Y}", "--stops", "a.shp"], "--stops can't be a.shp: let it end in .gpkg or .dxf or .csv."),
-        (["--seed", f"{X},{Y}", "--rail-class", "300"], "--rail-class can't be 300: give a number from 0 to 255."),
     ],
 )
 def test_each_mistake_of_a_growth_gets_a_sentence(raw, tmp_path, capsys, options, message):
