@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from heard import Heard
 from rail_extract.core.clouds.las import laspy
 from rail_extract.core.clouds.points import ask
 from rail_extract.core.clouds.vpc import list_tiles
@@ -13,7 +14,6 @@ from rail_extract.core.grow.start import find_start
 from rail_extract.core.labelling.files import Choice, plan_output
 from rail_extract.core.labelling.growing import grow_files
 from rail_extract.core.parameters import GrowParameters
-from rail_extract.core.progress import Progress, Recording
 from rail_extract.core.run.loop import Runner
 from rail_extract.core.scratch import scratch_folder
 from rail_extract.core.standards import SEARCHED_CLASSES
@@ -36,19 +36,8 @@ def save(path, xyz, codes=1):
     return path
 
 
-class Messages(Recording):
-    """Keeps what is said."""
-
-    def __init__(self):
-        super().__init__(Progress())
-        self.infos = []
-
-    def info(self, text):
-        self.infos.append(text)
-
-
 def grow(tmp_path, paths, output, seeds, choice=TEN, **changes):
-    progress = Messages()
+    progress = Heard()
     planned = plan_output(paths, output, choice.class_code, progress)
     request = ask(paths, SEARCHED_CLASSES, None, None, progress)
     settings = GrowSettings(GAUGE_M, WIDTH_M, GrowParameters(**changes))

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from heard import Heard
 from rail_extract.core.clouds.las import laspy
 from rail_extract.core.clouds.points import ask, read_rail_points
 from rail_extract.core.errors import Cancelled, NoRailPointsError
@@ -63,15 +64,8 @@ def test_files_that_have_not_changed_are_not_read_again(files, tmp_path):
 
 
 def test_an_interrupted_reading_starts_again(files, tmp_path):
-    class Stopped(Progress):
-        left = 1
-
-        def is_cancelled(self):
-            self.left -= 1
-            return self.left < 0
-
     with pytest.raises(Cancelled):
-        spool(ask(files, [10]), SIDE, tmp_path, Stopped())
+        spool(ask(files, [10]), SIDE, tmp_path, Heard(cancel_after=1))
     again = spool(ask(files, [10]), SIDE, tmp_path)
     assert sum(again[0].counts.values()) == len(read_rail_points(files, [10])[0].xyz)
 
@@ -144,18 +138,14 @@ def put_a_folder(path):
 )
 @pytest.mark.parametrize("what", ["report.json", "10_*"])
 def test_damaged_points_are_read_again_with_a_warning(files, tmp_path, damage, what):
-    class Heard(Progress):
-        def warning(self, text):
-            warnings.append(text)
-
-    warnings = []
     work = tmp_path / "work"
     work.mkdir()
     first = spool(ask(files, [10]), SIDE, work)
     before = {file: file.read_bytes() for file in work.rglob("*") if file.is_file()}
     damage(sorted(work.rglob(what))[0])
-    second = spool(ask(files, [10]), SIDE, work, Heard())
-    (warning,) = warnings
+    heard = Heard()
+    second = spool(ask(files, [10]), SIDE, work, heard)
+    (warning,) = heard.warnings
     assert re.fullmatch(r"The stored points of [01]\.laz are damaged: the file is read again\.", warning)
     assert second[0].counts == first[0].counts
     assert {file: file.read_bytes() for file in work.rglob("*") if file.is_file()} == before
