@@ -5,20 +5,16 @@ from __future__ import annotations
 import argparse
 import json
 from collections.abc import Sequence
-from datetime import date
 from pathlib import Path
 
 import numpy as np
 
 from ...core.clouds.crs import parse_crs
-from ...core.clouds.las import laspy
 from ...core.errors import CloudError, ParameterError
 from .catalogue import SCENES
+from .las import write_las
 from .raw import RawScene
 from .scene import Scene
-
-SCALE_M = 0.001
-"""Resolution of the coordinates in the file: a millimetre, as that of scanners."""
 
 TRUTH_DECIMALS = 4
 """Decimals of the coordinates of true lines: a tenth of a millimetre."""
@@ -31,27 +27,11 @@ TONES = np.array(
 ) * np.uint16(256)
 """Colour and intensity of each kind of point, see `raw_world.KINDS`: ballast is dark, railheads are bright."""
 
-MADE = date(2025, 1, 1)
-"""Date in the header of the file, fixed so that the same scene gives the same file."""
-
 
 def write_cloud(scene: Scene, path: Path) -> None:
     """Write a scene as LAS 1.4, compressed if the name ends in .laz."""
-    header = laspy.LasHeader(version="1.4", point_format=6)
-    header.scales = np.full(3, SCALE_M)
-    header.offsets = scene.frame.origin
-    header.creation_date = MADE
-    header.generating_software = "Rail Extract scenes"
-    if scene.frame.crs_wkt:
-        header.add_crs(parse_crs(scene.frame.crs_wkt))
-    cloud = laspy.LasData(header)
-    cloud.x, cloud.y, cloud.z = scene.frame.to_crs(scene.xyz).T
-    cloud.classification = scene.classification
-    if scene.strips is not None:
-        cloud.point_source_id = scene.strips
-    if scene.times is not None:
-        cloud.gps_time = scene.times
-    cloud.write(path)
+    known = {"point_source_id": scene.strips, "gps_time": scene.times}
+    _write(scene, path, 6, classification=scene.classification, **known)
 
 
 def write_raw(scene: RawScene, path: Path) -> None:
@@ -60,28 +40,21 @@ def write_raw(scene: RawScene, path: Path) -> None:
     A survey by images has colours and the classes of a ground filter, but no intensity and no time (format 2); a scan
     has intensities and times (format 6).
     """
-    of_images = scene.classification is not None
-    header = laspy.LasHeader(version="1.4", point_format=2 if of_images else 6)
-    header.scales = np.full(3, SCALE_M)
-    header.offsets = scene.frame.origin
-    header.creation_date = MADE
-    header.generating_software = "Rail Extract scenes"
-    if scene.frame.crs_wkt:
-        header.add_crs(parse_crs(scene.frame.crs_wkt))
-    cloud = laspy.LasData(header)
-    cloud.x, cloud.y, cloud.z = scene.frame.to_crs(scene.xyz).T
-    cloud.return_number = cloud.number_of_returns = np.ones(len(scene.xyz), dtype=np.uint8)
     tone = TONES[scene.kind]
-    if of_images:
-        cloud.classification = scene.classification
-        cloud.red = cloud.green = cloud.blue = tone
+    facts = {"return_number": 1, "number_of_returns": 1, "point_source_id": scene.strips}
+    if scene.classification is not None:
+        facts.update(classification=scene.classification, red=tone, green=tone, blue=tone)
+        _write(scene, path, 2, **facts)
     else:
-        cloud.classification = np.ones(len(scene.xyz), dtype=np.uint8)
-        cloud.intensity = tone
-        cloud.gps_time = np.arange(len(scene.xyz)) / POINTS_PER_S if scene.times is None else scene.times
-    if scene.strips is not None:
-        cloud.point_source_id = scene.strips
-    cloud.write(path)
+        times = np.arange(len(scene.xyz)) / POINTS_PER_S if scene.times is None else scene.times
+        _write(scene, path, 6, classification=1, intensity=tone, gps_time=times, **facts)
+
+
+def _write(scene: Scene | RawScene, path: Path, point_format: int, **dimensions) -> None:
+    """Write points with those of the values that are known."""
+    known = {name: values for name, values in dimensions.items() if values is not None}
+    xyz, where = scene.frame.to_crs(scene.xyz), {"offsets": scene.frame.origin, "version": "1.4"}
+    write_las(path, xyz, scene.frame.crs_wkt, point_format=point_format, **where, **known)
 
 
 def write_truth(scene: Scene, path: Path) -> None:

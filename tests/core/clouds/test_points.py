@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import laspy
 import numpy as np
-import pyproj
 import pytest
 from heard import Heard
 from rail_extract.core.clouds import las
@@ -19,6 +18,7 @@ from rail_extract.core.errors import (
     EmptyCloudError,
     NoRailPointsError,
 )
+from rail_extract.laboratory.scenes.las import las_data
 
 RAIL = 10
 UTM = "EPSG:32643"
@@ -28,14 +28,9 @@ PLACE = np.array([578123.0, 2494456.0, 556.0])
 def make_cloud(path, crs=UTM, version="1.4", point_format=6, count=3000, place=PLACE, codes=(1, 2, RAIL), spread=20.0):
     """Write a cloud around a place; return its coordinates as stored, and its classes."""
     random = np.random.RandomState(1)
-    header = laspy.LasHeader(version=version, point_format=point_format)
-    header.scales = [0.001] * 3 if spread > 1 else [1e-9] * 3
-    header.offsets = np.floor(place)
-    if crs is not None:
-        header.add_crs(pyproj.CRS.from_user_input(crs))
-    cloud = laspy.LasData(header)
-    cloud.x, cloud.y, cloud.z = (place + spread * random.standard_normal((count, 3))).T
-    cloud.classification = random.choice(codes, size=count)
+    xyz, codes = place + spread * random.standard_normal((count, 3)), random.choice(codes, size=count)
+    how = {"version": version, "point_format": point_format, "scales": 0.001 if spread > 1 else 1e-9}
+    cloud = las_data(xyz, crs, **how, offsets=np.floor(place), classification=codes)
     cloud.write(path)
     return np.column_stack([cloud.x, cloud.y, cloud.z]), np.asarray(cloud.classification)
 

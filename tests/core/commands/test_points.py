@@ -14,6 +14,7 @@ from rail_extract.core.pipeline.sources import Grown, Raw
 from rail_extract.core.run import processes
 from rail_extract.core.run.loop import Runner
 from rail_extract.core.standards import SEARCHED_CLASSES
+from rail_extract.laboratory.scenes.las import write_las
 from rail_extract.laboratory.scenes.raw_shapes import MIDDLE, flat, rough, with_track
 from rail_extract.laboratory.scenes.raw_strips import SPACING_M, strip
 
@@ -25,14 +26,7 @@ X, Y = CORNER[:2] + STRIP.at(7.0, SPACING_M / 2)
 @pytest.fixture
 def save(tmp_path):
     def save(xyz, name="raw.laz", crs=None):
-        header = laspy.LasHeader(point_format=6, version="1.4")
-        header.scales, header.offsets = [0.0005] * 3, CORNER
-        if crs:
-            header.add_crs(pyproj.CRS(crs))
-        cloud = laspy.LasData(header)
-        cloud.x, cloud.y, cloud.z = (xyz + CORNER).T
-        cloud.write(tmp_path / name)
-        return tmp_path / name
+        return write_las(tmp_path / name, xyz + CORNER, crs, offsets=CORNER, scales=0.0005)
 
     return save
 
@@ -159,7 +153,7 @@ def test_each_mistake_of_a_search_gets_a_sentence(save, tmp_path, capsys, monkey
 
 @pytest.fixture
 def raw(save):
-    return str(save(STRIP.xyz, "raw.las", 25832))
+    return str(save(STRIP.xyz, "raw.las", "EPSG:25832"))
 
 
 def test_a_copy_has_the_rail_that_grew_from_a_seed(raw, tmp_path, capsys):

@@ -6,6 +6,7 @@ import pytest
 from rail_extract.__main__ import INTERRUPTED, main
 from rail_extract.core.classify.settings import Settings
 from rail_extract.laboratory.ruler.whole_clouds import classify_cloud  # noqa: E402
+from rail_extract.laboratory.scenes.las import write_las
 from rail_extract.laboratory.scenes.raw_shapes import track_beside_kerb
 
 SIDE_M = Settings((1.435,), 0.072).side_m
@@ -18,13 +19,7 @@ pytestmark = pytest.mark.usefixtures("small_training")
 @pytest.fixture
 def save(tmp_path):
     def save(name, xyz, codes):
-        header = laspy.LasHeader(point_format=6, version="1.4")
-        header.scales, header.offsets = [0.0005] * 3, CORNER
-        cloud = laspy.LasData(header)
-        cloud.x, cloud.y, cloud.z = (xyz + CORNER).T
-        cloud.classification = codes
-        cloud.write(tmp_path / name)
-        return str(tmp_path / name)
+        return str(write_las(tmp_path / name, xyz + CORNER, offsets=CORNER, scales=0.0005, classification=codes))
 
     return save
 

@@ -17,6 +17,7 @@ from rail_extract.core.parameters import GrowParameters
 from rail_extract.core.run.loop import Runner
 from rail_extract.core.scratch import scratch_folder
 from rail_extract.core.standards import SEARCHED_CLASSES
+from rail_extract.laboratory.scenes.las import write_las
 from rail_extract.laboratory.scenes.raw_strips import GAUGE_M, SPACING_M, WIDTH_M, strip
 
 CORNER = np.array([500_003.0, 5_000_008.0, 100.0])
@@ -26,14 +27,9 @@ SEED = CORNER[:2] + TRACK.at(12.0, SPACING_M / 2)
 
 
 def save(path, xyz, codes=1):
-    header = laspy.LasHeader(point_format=6, version="1.4")
-    header.scales, header.offsets = [0.0005] * 3, CORNER
-    cloud = laspy.LasData(header)
-    cloud.x, cloud.y, cloud.z = (xyz + CORNER).T
-    cloud.classification = np.full(len(xyz), codes)
-    cloud.intensity = np.arange(len(xyz)) % 60_000
-    cloud.write(path)
-    return path
+    intensity = np.arange(len(xyz)) % 60_000
+    where = {"offsets": CORNER, "scales": 0.0005}
+    return write_las(path, xyz + CORNER, **where, classification=codes, intensity=intensity)
 
 
 def grow(tmp_path, paths, output, seeds, choice=TEN, **changes):

@@ -9,15 +9,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from heard import Heard
-from rail_extract.core.clouds.las import laspy
 from rail_extract.core.clouds.points import ask, read_rail_points
 from rail_extract.core.errors import Cancelled, NoRailPointsError
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.progress import Progress
 from rail_extract.core.tiles.grid import MemorySource, Square, lay_out
 from rail_extract.core.tiles.spool import Census, SpooledPoints, _fingerprint, spool
+from rail_extract.laboratory.scenes.las import las_data, write_las
 
-SIDE = 30.0
+SIDE, CORNER = 30.0, [500_000, 5_400_000, 0]
 
 
 @pytest.fixture
@@ -29,12 +29,7 @@ def files(tmp_path):
     folder = tmp_path / "cloud"
     folder.mkdir()
     for number, part in enumerate((along < 47, along >= 47)):
-        header = laspy.LasHeader(version="1.4", point_format=6)
-        header.scales, header.offsets = np.full(3, 0.001), [500_000, 5_400_000, 0]
-        cloud = laspy.LasData(header)
-        cloud.x, cloud.y, cloud.z = xyz[part].T
-        cloud.classification = codes[part]
-        cloud.write(folder / f"{number}.laz")
+        write_las(folder / f"{number}.laz", xyz[part], offsets=CORNER, classification=codes[part])
     return folder
 
 
@@ -100,12 +95,8 @@ def test_a_file_of_the_same_size_that_has_changed_is_read_again(tmp_path):
     folder.mkdir()
 
     def write(count, time):
-        header = laspy.LasHeader(version="1.4", point_format=6)
-        header.scales, header.offsets = np.full(3, 0.001), [500_000, 5_400_000, 0]
-        cloud = laspy.LasData(header)
-        cloud.x, cloud.y, cloud.z = np.tile([[500_001.0], [5_400_001.0], [0.0]], 100)
-        cloud.classification = np.where(np.arange(100) < count, 10, 2).astype(np.uint8)
-        cloud.write(file)
+        codes = np.where(np.arange(100) < count, 10, 2)
+        write_las(file, np.tile([500_001.0, 5_400_001.0, 0.0], (100, 1)), offsets=CORNER, classification=codes)
         os.utime(file, (time, time))
         return file.stat().st_size
 
@@ -166,11 +157,8 @@ def test_points_keep_their_strips(tmp_path):
     folder.mkdir()
     xyz = random.uniform(0, 1, (4000, 3)) * [80.0, 20.0, 0.02] + [500_000, 5_400_000, 300]
     strips = np.where(xyz[:, 0] < 500_060, random.choice([0, 7], 4000), 9)
-    header = laspy.LasHeader(version="1.4", point_format=6)
-    header.scales, header.offsets, header.file_source_id = np.full(3, 0.001), [500_000, 5_400_000, 0], 4
-    cloud = laspy.LasData(header)
-    cloud.x, cloud.y, cloud.z = xyz.T
-    cloud.classification, cloud.point_source_id = np.full(4000, 10, np.uint8), strips
+    cloud = las_data(xyz, offsets=CORNER, classification=10, point_source_id=strips)
+    cloud.header.file_source_id = 4
     cloud.write(folder / "a.laz")
     expected = np.where(strips == 0, 4, strips)  # a point without a source id has that of its file
     (points,) = read_rail_points(folder, [10])

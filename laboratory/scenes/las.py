@@ -1,0 +1,63 @@
+"""Points as LAS, the same for the same points."""
+
+from __future__ import annotations
+
+from datetime import date
+from pathlib import Path
+
+import numpy as np
+
+from ...core.clouds.crs import parse_crs
+from ...core.clouds.las import laspy
+
+SCALE_M = 0.001
+"""Resolution of the coordinates in the file: a millimetre, as that of scanners."""
+
+MADE = date(2025, 1, 1)
+"""Date in the header of the file, fixed so that the same scene gives the same file."""
+
+
+def las_data(
+    xyz: np.ndarray,
+    crs: str | None = None,
+    *,
+    offsets: np.ndarray | None = None,
+    scales: float | list[float] = SCALE_M,
+    point_format: int = 6,
+    version: str = "",
+    **dimensions: np.ndarray | int,
+) -> laspy.LasData:
+    """Return points as LAS.
+
+    Parameters
+    ----------
+    xyz : np.ndarray
+        (n, 3), in the coordinate system of the file.
+    crs : str, optional
+        Coordinate system, as WKT or code.
+    offsets : np.ndarray, optional
+        Of the coordinates, (3,); without it, the whole numbers below the first point.
+    scales : float or list of float
+    point_format : int
+    version : str
+        Without it, 1.4 where the point format asks for it, else 1.2.
+    **dimensions
+        Other values of the points, (n,) or one for all.
+    """
+    header = laspy.LasHeader(version=version or ("1.4" if point_format > 5 else "1.2"), point_format=point_format)
+    header.scales = np.broadcast_to(scales, 3).astype(float)
+    header.offsets = np.floor(xyz[0]) if offsets is None else offsets
+    header.creation_date, header.generating_software = MADE, "Rail Extract scenes"
+    if crs:
+        header.add_crs(parse_crs(crs))
+    points = laspy.LasData(header)
+    points.x, points.y, points.z = xyz.T
+    for name, values in dimensions.items():
+        points[name] = np.broadcast_to(values, len(xyz))
+    return points
+
+
+def write_las(path: Path, xyz: np.ndarray, *crs: str, **more) -> Path:
+    """Write points, compressed if the name ends in .laz; see `las_data`."""
+    las_data(xyz, *crs, **more).write(path)
+    return path
