@@ -45,7 +45,6 @@ def row(scene: Scene, network: RailNetwork) -> str:
 
     Parameters
     ----------
-    scene : Scene
     network : RailNetwork
         What was extracted from it, with the geometry of its tracks.
     """

@@ -109,16 +109,12 @@ def row_of(
 
     Parameters
     ----------
-    seed : int
-    title : str
     families : list of Family
         One for each design.
-    white_m : float
     shared : (float, float)
         Standard deviation and correlation length of the misalignment, metres.
     length_m : float, optional
         Length to which the design is cut; else it has `elements`.
-    elements : int
     given : bool
         Whether the fit is given the types of the true elements.
     """

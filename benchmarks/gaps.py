@@ -57,7 +57,6 @@ def bridged_share(cleaner: Cleaner, length_m: float, reach_m: float, count: int)
 
     Parameters
     ----------
-    cleaner : Cleaner
     length_m, reach_m : float
         See `cut`.
     count : int
@@ -83,8 +82,6 @@ def cut(pair: Pair, rng: np.random.Generator, length_m: float, reach_m: float) -
 
     Parameters
     ----------
-    pair : Pair
-    rng : numpy Generator
     length_m : float
         Length along the rail.
     reach_m : float
@@ -122,7 +119,6 @@ def ratio_scores(cleaner: Cleaner, ratio: float, count: int) -> tuple[Scores, Sc
 
     Parameters
     ----------
-    cleaner : Cleaner
     ratio : float
         Gauge divided by railhead width.
     count : int

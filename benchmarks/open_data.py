@@ -53,11 +53,8 @@ class DataSet:
 
     Attributes
     ----------
-    name : str
     file : Pattern
         Of the names of files, with the groups `run` and `part`.
-    rail_class : int
-    standard : str
     files_in_place : int
         Files next to each other that are evaluated together.
     registered : bool
@@ -343,8 +340,6 @@ def compare(rails: Sequence[RailLine], heads: np.ndarray) -> tuple[int, int, flo
 
     Returns
     -------
-    cells, cells_right : int
-    right_m : float
     across_m, height_m : (k,) array
         See `Result`.
     """

@@ -114,7 +114,6 @@ def compare_lengths(folder: Path, km: float, times: int) -> dict:
 
     Parameters
     ----------
-    folder : Path
     km : float
         Length of the short track.
     times : int

@@ -70,7 +70,6 @@ def track_scene(
 
     Parameters
     ----------
-    scanner : Scanner
     curvature : float
         1/m.
     heading : float
@@ -166,7 +165,6 @@ def draw(outcomes: dict[str, list[Outcome]], figure: str, label: str, path: Path
 
     Parameters
     ----------
-    outcomes : dict of name to list of Outcome
     figure : str
         Name of an attribute of `Comparison`.
     label : str

@@ -45,10 +45,8 @@ class Cut:
 
     Attributes
     ----------
-    points : RailPoints
     parameters : Parameters
         Without thinning, which may keep different vertices of the same curve.
-    arrays : dict
     """
 
     points: RailPoints
@@ -103,8 +101,6 @@ def speed_table(cut: Cut, rounds: int, clock: Callable[[], float]) -> Iterable[s
 
     Parameters
     ----------
-    cut : Cut
-    rounds : int
     clock : callable
         Returns seconds.
     """

@@ -14,7 +14,6 @@ class Element:
 
     Attributes
     ----------
-    length_m : float
     start, end : float
         Curvature in 1/m, positive to the left.
     """
@@ -36,7 +35,6 @@ class Curve:
         Radians, counterclockwise from the x axis.
     curvature : (n,) array
         1/m, positive to the left.
-    step_m : float
     """
 
     xy: np.ndarray
@@ -87,7 +85,6 @@ def trace(
 
     Parameters
     ----------
-    elements : sequence of Element
     start : tuple of float
         x and y of the first point, metres.
     heading : float
@@ -122,7 +119,6 @@ def transition_curve(straight_m: float, clothoid_m: float, arc_m: float, curvatu
     ----------
     straight_m, clothoid_m : float
         Length of each of the two straights and of the two clothoids.
-    arc_m : float
     curvature : float
         Of the arc, 1/m, positive to the left.
 

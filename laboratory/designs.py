@@ -159,8 +159,6 @@ def surveyed(
 
     Parameters
     ----------
-    design : Alignment
-    random : Generator
     white_m : float
         Standard deviation of errors that are independent from vertex to vertex, metres.
     misaligned_m, correlation_m : float
@@ -199,9 +197,6 @@ class TrackScene:
 
     Attributes
     ----------
-    design : Alignment
-    track : Track
-    settings : FitParameters
     fixed : Alignment, optional
         Elements whose types are given.
     """

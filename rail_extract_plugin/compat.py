@@ -31,10 +31,8 @@ def field(name: str, kind, decimals: int = 0) -> QgsField:
 
     Parameters
     ----------
-    name : str
     kind
         `INTEGER`, `REAL` or `TEXT`.
-    decimals : int
     """
     return QgsField(name, kind, "", DIGITS if decimals else 0, decimals)
 

@@ -16,7 +16,6 @@ class QgisProgress(Progress):
 
     Parameters
     ----------
-    feedback : QgsProcessingFeedback
     definitions : sequence of QgsProcessingParameterDefinition
         Parameters whose names may occur in messages.
     """
@@ -53,12 +52,7 @@ class QgisProgress(Progress):
 
 
 class TaskProgress(Progress):
-    """Shows the progress of a background task in QGIS's status bar.
-
-    Parameters
-    ----------
-    task : QgsTask
-    """
+    """Shows the progress of a background task in QGIS's status bar."""
 
     def __init__(self, task: QgsTask) -> None:
         self._task = task

@@ -58,14 +58,10 @@ class Scene:
 
     Attributes
     ----------
-    raw : RawScene
-    settings : Settings
     height : (n,) array
         Above the bed.
-    tops : Tops
     marks : (k,) int array
         Narrow cells, one of each block.
-    kept : square.Kept
     """
 
     raw: RawScene

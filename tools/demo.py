@@ -59,14 +59,7 @@ def extract() -> dict:
 
 
 def row(name: str, length_m: float, result: Comparison) -> str:
-    """Return a row of the table.
-
-    Parameters
-    ----------
-    name : str
-    length_m : float
-    result : Comparison
-    """
+    """Return a row of the table."""
     return (
         f"{name:12}{result.line_count:6}{result.truth_count:6}{length_m:8.1f} m"
         f"{result.completeness:8.1%} {result.correctness:8.1%} {result.lateral_rmse_m * 1000:10.1f} mm"

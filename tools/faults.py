@@ -24,14 +24,12 @@ class Fault:
 
     Attributes
     ----------
-    name : str
     ends : str
         `REFUSED`, `WARNED` or `FINE`.
     gives : dict
         Some of the expected results.
     says : str
         The expected message; … stands for any text. Empty if there is none.
-    algorithm : str
     prepare : callable
         Creates the fault, given the fixture `bench`, and returns the parameters of the run.
     """

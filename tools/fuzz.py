@@ -151,8 +151,6 @@ def fuzz(kind: Kind, seeds: Iterable[int], until: float = float("inf")) -> tuple
 
     Parameters
     ----------
-    kind : Kind
-    seeds : iterable of int
     until : float
         Time of `time.monotonic`.
 

@@ -237,7 +237,6 @@ def kill_once(name: str, folder: Path, first: int, after_s: float) -> str:
         Key of `FORMATS`.
     folder : Path
         Folder of the file, with the version before `first`.
-    first : int
     after_s : float
         Seconds from the first write to the kill.
 

@@ -15,7 +15,6 @@ def read_features(path: Path, layer: str | None = None, where: str | None = None
 
     Parameters
     ----------
-    path : Path
     layer : str, optional
         By default, the first layer.
     where : str, optional

@@ -24,7 +24,6 @@ def layer_of(
         One for each feature: WKT, vertices of a line, or nothing.
     kind : str
         The geometry type of QGIS; "None" for a table.
-    crs : str
     fields : str
         In the form of QGIS, such as `&field=km:double`.
     values : sequence of sequences

@@ -58,11 +58,9 @@ def bench(
 
     Parameters
     ----------
-    curve : Curve
     heights : float or (n,) array
     gaps : Gaps
         In both rails.
-    scanner : Scanner
     **clutter
         Attributes of `Clutter`.
     """

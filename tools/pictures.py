@@ -17,9 +17,6 @@ def draw_pictures(pictures: Mapping[str, Callable[[], Figure]], folder: Path, dp
     ----------
     pictures : mapping of str to callable
         What draws each picture.
-    folder : Path
-    dpi : int
-    names : sequence of str
     """
     unknown = sorted({*names} - {*pictures})
     if unknown:

@@ -42,7 +42,6 @@ def race_once(name: str, folder: Path, first: int, delays_s: tuple[float, float]
         Key of `FORMATS`.
     folder : Path
         Folder of the file.
-    first : int
     delays_s : tuple of float
         Time that each process waits before it writes.
 

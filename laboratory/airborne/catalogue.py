@@ -27,9 +27,6 @@ class FlownScene:
 
     Attributes
     ----------
-    design : Design
-    flight : Flight
-    cloud : AirborneCloud
     guides : list of (k, 2) array
     meant : sequence of int or None
         Track that each guide means; None where none is.

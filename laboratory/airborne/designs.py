@@ -21,8 +21,6 @@ class Design:
 
     Attributes
     ----------
-    world : World
-    tracks : tuple of Track
     where : (n, 2) array
         Line along which it is flown.
     width_m : float
@@ -59,8 +57,6 @@ def curved_line(
     ----------
     seed : int
         Chooses radius, cant, gradient, direction, spacing and what lies beside the line.
-    length_m : float
-    tracks : int
     cant_m, radius_m : float, optional
         Instead of those of the seed.
     """

@@ -30,7 +30,6 @@ class Flight:
         Diameter of the beam on the ground.
     noise_m : float
         Standard deviation of the range.
-    strips : int
     strip_up_m, strip_across_m : float
         Distance between the strips in height and in plan; the truth lies in the middle.
     aspect : float
@@ -80,12 +79,8 @@ def fly(world: World, where: np.ndarray, width_m: float, flight: Flight, seed: i
 
     Parameters
     ----------
-    world : World
     where : (k, 2) array
         Middle of the area, a line; only points within `width_m` of it are made.
-    width_m : float
-    flight : Flight
-    seed : int
     """
     rng = np.random.RandomState(seed)
     turn = rng.uniform(0, 2 * np.pi)

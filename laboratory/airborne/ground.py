@@ -92,7 +92,6 @@ class Band:
 
     Attributes
     ----------
-    axis : Axis
     profile : (k, 2) array
         Metres to the left of the line, rising, and above it.
     start_m, end_m : float
@@ -135,7 +134,6 @@ class World:
         Ballast piled above its usual top: 0 shows 18 cm of the rail above the sleepers.
     six_foot_m : float
         Ballast between two tracks, below the top of the lower one's rails.
-    seed : int
     """
 
     tracks: Sequence[Track]

@@ -27,7 +27,6 @@ def las_of(cloud: AirborneCloud, class_code: int = GROUND, frame: LocalFrame = F
 
     Parameters
     ----------
-    cloud : AirborneCloud
     class_code : int
         Of all points.
     frame : LocalFrame

@@ -19,13 +19,7 @@ TRACK_SPACING_M = (3.5, 6.0)
 
 
 def random_radius(rng: np.random.Generator, min_radius_m: float, max_radius_m: float = MAX_RADIUS_M) -> float:
-    """Draw a radius whose logarithm is uniformly distributed.
-
-    Parameters
-    ----------
-    rng : numpy Generator
-    min_radius_m, max_radius_m : float
-    """
+    """Draw a radius whose logarithm is uniformly distributed."""
     return math.exp(rng.uniform(math.log(min_radius_m), math.log(max_radius_m)))
 
 
@@ -39,7 +33,6 @@ def bend(rng: np.random.Generator, radius_m: float, turns: tuple[int, ...]) -> C
 
     Parameters
     ----------
-    rng : numpy Generator
     radius_m : float
         Smallest radius.
     turns : tuple of int

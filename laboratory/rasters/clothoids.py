@@ -112,7 +112,6 @@ def join(start: Pose, end: Pose, share: int = 1) -> list[Element] | None:
 
     Parameters
     ----------
-    start, end : Pose
     share : int
         Index into `SHARES`.
 
@@ -144,9 +143,6 @@ def random_joins(
 
     Parameters
     ----------
-    rng : numpy Generator
-    poses : list of Pose
-    count : int
     min_radius_m : float
         Combinations with a smaller radius are excluded.
 

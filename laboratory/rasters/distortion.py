@@ -77,10 +77,6 @@ def draw_pair(
 
     Parameters
     ----------
-    rng : numpy Generator
-    layout : Layout
-    window : Window
-    head_width_m : float
     severity : float
         0 to 1.
     thin : bool

@@ -45,12 +45,10 @@ def draw_label(
     Parameters
     ----------
     target : (size, size) array of bool or int, changed
-    window : Window
     xy, normal : (n, 2) arrays
         Samples of the line, at most a cell apart, and unit normals.
     width_m : float
         Railhead width.
-    value : int
     """
     kept = window.near(xy, width_m)
     if np.count_nonzero(kept) < 2:
@@ -106,7 +104,6 @@ def scan_profiles(
 
     Parameters
     ----------
-    rng : numpy Generator
     xy, normal : (n, 2) arrays
     right_m, left_m : (n,) arrays
         Offsets of the head's two edges along the normal; the right one is negative.

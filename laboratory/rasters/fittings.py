@@ -61,14 +61,12 @@ def guard(
 
     Parameters
     ----------
-    rng : numpy Generator
     axis : Curve
         Axis of the track.
     at : int
         Sample of the axis at the middle of the guard rail.
     side : int
         1 for the left rail, -1 for the right one.
-    size : TrackSize
     length_m : tuple of float
         Smallest and largest length.
     """
@@ -86,12 +84,10 @@ def check_rail(rng: np.random.Generator, axis: Curve, side: int, size: TrackSize
 
     Parameters
     ----------
-    rng : numpy Generator
     axis : Curve
         Axis of the track.
     side : int
         1 where the curve turns left, -1 where it turns right.
-    size : TrackSize
     """
     length_m = rng.uniform(8.0, 40.0)
     return guard(rng, axis, len(axis.xy) // 2 + int(rng.uniform(-5.0, 5.0) / axis.step_m), side, size, (length_m,) * 2)
@@ -102,12 +98,10 @@ def frog(rng: np.random.Generator, main: Curve, side: Curve, hand: int, size: Tr
 
     Parameters
     ----------
-    rng : numpy Generator
     main, side : Curve
         Axes of the main track and of the branch, both from the toe.
     hand : int
         1 where the branch leaves to the left, -1 where it leaves to the right.
-    size : TrackSize
 
     Returns
     -------

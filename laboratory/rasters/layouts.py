@@ -62,8 +62,6 @@ def random_layout(rng: np.random.Generator, size: TrackSize, family: str | None 
 
     Parameters
     ----------
-    rng : numpy Generator
-    size : TrackSize
     family : str, optional
         One of `FAMILIES` or `RARE_FAMILIES`; by default, one of `FAMILIES` is drawn by `WEIGHTS`.
     """

@@ -49,14 +49,7 @@ def worst_share(severity: float) -> float:
 
 
 def lone_lines(rng: np.random.Generator, window: Window, severity: float) -> list[RailPath]:
-    """Draw short straight lines that belong to no track: cables, ends of sleepers, edges of platforms.
-
-    Parameters
-    ----------
-    rng : numpy Generator
-    window : Window
-    severity : float
-    """
+    """Draw short straight lines that belong to no track: cables, ends of sleepers, edges of platforms."""
     lines = []
     for _ in range(rng.poisson(LONE_LINES * severity * _area(window))):
         heading = rng.uniform(-math.pi, math.pi)
@@ -69,12 +62,6 @@ def lone_lines(rng: np.random.Generator, window: Window, severity: float) -> lis
 
 def shadows(rng: np.random.Generator, window: Window, severity: float) -> np.ndarray:
     """Draw wedges that are hidden from the scanner by masts, cabinets and trains.
-
-    Parameters
-    ----------
-    rng : numpy Generator
-    window : Window
-    severity : float
 
     Returns
     -------
@@ -102,9 +89,7 @@ def flip(
 
     Parameters
     ----------
-    rng : numpy Generator
     observed, label : (size, size) bool arrays
-    severity : float
     cell_m : float
         Side of a cell.
 
@@ -128,9 +113,7 @@ def scatter_patches(rng: np.random.Generator, observed: np.ndarray, severity: fl
 
     Parameters
     ----------
-    rng : numpy Generator
     observed : (size, size) bool array
-    severity : float
 
     Returns
     -------

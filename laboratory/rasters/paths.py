@@ -24,7 +24,6 @@ class TrackSize:
     ----------
     spacing_m : float
         Distance between the two railhead centres.
-    head_width_m : float
     """
 
     spacing_m: float
@@ -92,7 +91,6 @@ def beside(curve: Curve, left_m: float | np.ndarray, track: int = NO_TRACK) -> R
 
     Parameters
     ----------
-    curve : Curve
     left_m : float or (n,) array
         Offset to the left.
     track : int
@@ -106,8 +104,6 @@ def track(axis: Curve, size: TrackSize, spot: bool = False) -> Layout:
 
     Parameters
     ----------
-    axis : Curve
-    size : TrackSize
     spot : bool
         Whether the middle of the track is a place that a raster should show.
     """

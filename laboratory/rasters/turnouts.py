@@ -27,7 +27,6 @@ class TurnoutForm:
 
     Attributes
     ----------
-    name : str
     radius_m : float
         Radius of the arc, at the axis of the branch.
     arc_m : float
@@ -91,7 +90,6 @@ def branch(main: Curve, toe_m: float, form: TurnoutForm, hand: int, leg_m: float
         Axis of the through track, in facing direction.
     toe_m : float
         Chainage of the toe.
-    form : TurnoutForm
     hand : int
         1: the branch leaves to the left; -1: to the right.
     leg_m : float
@@ -121,15 +119,12 @@ def turnout(
 
     Parameters
     ----------
-    rng : numpy Generator
     main : Curve
         Axis of the main track.
     toe_m : float
         Chainage of the toe.
-    form : TurnoutForm
     hand : int
         1: the branch leaves to the left; -1: to the right.
-    size : TrackSize
     """
     side = branch(main, toe_m, form, hand, rng.uniform(15.0, 45.0))
     ahead = main.piece(toe_m, main.length_m)
@@ -151,7 +146,6 @@ def crossover(
 
     Parameters
     ----------
-    rng : numpy Generator
     axis : Curve
         Axis to which both tracks are parallel.
     offsets : tuple of float
@@ -160,7 +154,6 @@ def crossover(
         Chainage of the middle.
     form : TurnoutForm
         Its arc is shortened where the tracks are close together; a straight switch is left out.
-    size : TrackSize
     """
     apart = abs(offsets[1] - offsets[0])
     hand = 1 if offsets[1] > offsets[0] else -1

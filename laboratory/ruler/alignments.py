@@ -92,7 +92,6 @@ def bound_of(design: Alignment, line: np.ndarray, white_m: float) -> Bound:
 
     Parameters
     ----------
-    design : Alignment
     line : (n, 3) array
         Vertices on the design without errors, local metres.
     white_m : float

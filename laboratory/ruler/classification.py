@@ -39,8 +39,6 @@ class Score:
 
     Attributes
     ----------
-    scene : str
-    points : int
     recall : float
         Share of the points on heads that are labelled; NaN without any.
     precision : float
@@ -51,7 +49,6 @@ class Score:
         Processor time of the classification.
     peak_mib : float
         Peak memory of the process.
-    figures : SearchFigures
     """
 
     scene: str
@@ -75,7 +72,6 @@ def score(scene: RawScene, wide: bool = False, weights: Path | None = None) -> t
 
     Parameters
     ----------
-    scene : RawScene
     wide : bool
         Whether the beam is as wide as a head.
     weights : Path, optional

@@ -77,7 +77,6 @@ class Variant:
 
     Attributes
     ----------
-    name : str
     model : str
         One of `frpdf.models.NAMES`.
     seed_shift : int

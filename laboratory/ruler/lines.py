@@ -27,7 +27,6 @@ class Comparison:
         Offset of the line in plan, positive to the left of the truth.
     height_rmse_m, height_p95_m, height_bias_m : float
         Height of the line above the truth.
-    line_count, truth_count : int
     length_ratio : float
         Length of all lines divided by the length of the truth, in space.
     """
@@ -94,7 +93,6 @@ class Match:
         Line of each place of `back`.
     t : (n,) array
         Plan distance of each place of `back` from the start of its line, metres.
-    line_count, truth_count : int
     true : (n,) int array
         Place of `there` that is nearest to each place of `back`; empty without lines or truth.
     """

@@ -34,17 +34,13 @@ class Result:
 
     Attributes
     ----------
-    scene : str
     rails, centerlines, script : Match
         Our lines, and the rails of the plain script, compared with the truth.
-    tracks : TrackErrors
-    geometry : GeometryErrors
     within_sigma, within_two_sigma : float
         Share of the lateral errors of our rails that do not exceed the standard error there, and twice the standard
         error.
     mean_error_m : float
         Standard error of the mean of the points in the smoothing length, if they are spread evenly across the head.
-    seconds, script_seconds : float
     peak_mib : float
         Peak memory up to the end of our extraction.
     """
@@ -68,7 +64,6 @@ def measure(scene: Scene, model: str = Parameters.model) -> Result:
 
     Parameters
     ----------
-    scene : Scene
     model : str
         One of `frpdf.models.NAMES`.
     """

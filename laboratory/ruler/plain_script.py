@@ -35,11 +35,6 @@ AROUND = np.ones((3, 3), dtype=int)
 def script_lines(points: RailPoints, gauge_m: float, head_width_m: float) -> list:
     """Extract rail lines with plain methods.
 
-    Parameters
-    ----------
-    points : RailPoints
-    gauge_m, head_width_m : float
-
     Returns
     -------
     list of (n, 3) array

@@ -40,12 +40,10 @@ def compare_tracks(
 
     Parameters
     ----------
-    centerlines : sequence of Centerline
     rails : sequence of RailLine
         The rails of the centerlines.
     truth : sequence of (n, 3) array
         True rails, metres, in the same frame.
-    head_width_m : float
     """
     errors = [np.empty((0, 2))]
     for centerline in centerlines:
@@ -70,7 +68,6 @@ class GeometryErrors:
 
     Attributes
     ----------
-    gauge_m, cant_m : float
     radius : float
         Relative to the true radius, where that is constant and below `CURVED_M`.
     """
@@ -90,10 +87,8 @@ def compare_geometry(
 
     Parameters
     ----------
-    geometry : sequence of TrackGeometry
     rails, centerlines : sequence of (n, 3) array
         True lines, metres, in the same frame.
-    head_width_m : float
     """
     plain, curved = [np.empty((0, 2))], [np.empty(0)]
     for track in geometry:

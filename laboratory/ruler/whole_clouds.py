@@ -35,8 +35,6 @@ def classify_cloud(xyz: np.ndarray, settings: Settings, progress: Progress = SIL
     xyz : (n, 3) array
         Metres from the zero of the coordinate system, so that the squares do not depend on how files are cut. With a
         guide, those that it holds.
-    settings : Settings
-    progress : Progress
 
     Returns
     -------
@@ -69,7 +67,6 @@ class GrowingCloud:
     ----------
     xyz : (n, 3) array
         Metres from the zero of the coordinate system.
-    settings : GrowSettings
     """
 
     def __init__(self, xyz: np.ndarray, settings: GrowSettings) -> None:

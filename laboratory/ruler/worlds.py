@@ -89,7 +89,6 @@ class Fault:
 
     Attributes
     ----------
-    cause : str
     figure : float
         The figure that is beyond its limit.
     xyz : (3,) array or None
@@ -117,12 +116,10 @@ class Judged:
         None if it does not fail.
     figures : dict
         By name; for the JSON line.
-    network : RailNetwork or None
     found : Match or None
         Lines compared with the truth.
     shown : (n,) bool array
         Places of the truth that are to be found.
-    findings : tuple of Finding
     """
 
     faults: tuple[Fault, ...]

@@ -47,12 +47,8 @@ def strip(
 
     Parameters
     ----------
-    rng : RandomState
-    track : Track
     left_m, up_m : float or (n,) array
         Distance of the middle of the strip to the left of the track's axis, and height above it, at the samples.
-    width_m : float
-    points_per_m : float
     noise_m : float
         Standard deviation in each of x, y and z.
 
@@ -105,8 +101,6 @@ def beside(name: str, seed: int, extras: Sequence[Extra], length_m: float = 60.0
 
     Parameters
     ----------
-    name : str
-    seed : int
     extras : sequence of callable
         Draw the points of these things.
     length_m, radius_m : float
@@ -190,13 +184,10 @@ def from_the_side(
 
     Parameters
     ----------
-    name : str
-    seed : int
     angle_deg : float
         Angle of the scanner above the horizontal, seen from the track.
     face_share : float
         Share of the points on side faces that are classified as rail.
-    noise_m, length_m : float
     top_share : float
         The same for the crown.
     """
@@ -234,11 +225,8 @@ def crossing(
 
     Parameters
     ----------
-    seed : int
-    length_m : float
     inside_m, depth_m : float
         Position of the dirt: from the axes of the rails towards the middle of the track, and below their tops.
-    noise_m : float
     """
     rng = np.random.RandomState(seed)
     curve = trace([Element(70.0, 1 / 1500, 1 / 1500)], heading=0.3 * seed)
@@ -264,13 +252,10 @@ def standing_train(
 
     Parameters
     ----------
-    name : str
-    seed : int
     head_share : float
         Share of the points on the heads below the train that the scanner sees, in places half a metre long.
     length_m : float
         Length of the train.
-    noise_m : float
     """
     rng = np.random.RandomState(seed)
     curve = trace([Element(110.0, 1 / 2000, 1 / 2000)], heading=0.25 * seed)
@@ -297,10 +282,8 @@ def grooved(seed: int = 42, road_m: float = 0.07, noise_m: float = 0.004) -> Sce
 
     Parameters
     ----------
-    seed : int
     road_m : float
         Width of the road that is classified as rail.
-    noise_m : float
     """
     rng = np.random.RandomState(seed)
     standard = replace(STANDARD, head_width_m=0.056)

@@ -30,10 +30,8 @@ def weeds(
 
     Parameters
     ----------
-    rng : RandomState
     lines : sequence of (n, 3) array
         Lines at the height of the railheads.
-    count : int
     reach_m : float
         Greatest distance from the line in x and in y.
     height_m : tuple of float
@@ -58,10 +56,8 @@ def stones(rng: np.random.RandomState, lines: Sequence[np.ndarray], count: int, 
 
     Parameters
     ----------
-    rng : RandomState
     lines : sequence of (n, 3) array
         Lines at the height of the railheads.
-    count : int
     reach_m : float
         Greatest distance from the line in x and in y.
 
@@ -79,7 +75,6 @@ def ground(rng: np.random.RandomState, centerlines: Sequence[np.ndarray], margin
 
     Parameters
     ----------
-    rng : RandomState
     centerlines : sequence of (n, 3) array
     margin_m : float
         Width of the ground beyond the outer tracks.

@@ -27,12 +27,10 @@ def write_copc(cloud: laspy.LasData, path: Path, low: np.ndarray, side_m: float,
     ----------
     cloud : LasData
         LAS 1.4; its records change.
-    path : Path
     low : (3,) array
         Corner of the octree with the smallest coordinates.
     side_m : float
         Side of the octree, units of the cloud.
-    levels : int
 
     Returns
     -------

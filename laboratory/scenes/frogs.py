@@ -59,10 +59,8 @@ def laid_together(tracks: Sequence[Track], clouds: Sequence[np.ndarray], head_wi
 
     Parameters
     ----------
-    tracks : sequence of Track
     clouds : sequence of (n, 3) array
         Points of each running rail, in the order of the tracks and their sides.
-    head_width_m : float
 
     Returns
     -------

@@ -37,8 +37,6 @@ def las_data(
         Coordinate system, as WKT or code.
     offsets : np.ndarray, optional
         Of the coordinates, (3,); without it, the whole numbers below the first point.
-    scales : float or list of float
-    point_format : int
     version : str
         Without it, 1.4 where the point format asks for it, else 1.2.
     **dimensions

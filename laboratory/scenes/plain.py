@@ -34,8 +34,6 @@ def rolling(curve: Curve, gradient: float = 0.004, wave_m: float = 0.01, wave_le
 
     Parameters
     ----------
-    curve : Curve
-    gradient : float
     wave_m, wave_length_m : float
         Amplitude and length of the waves.
 
@@ -59,13 +57,10 @@ def random_gaps(
 
     Parameters
     ----------
-    rng : RandomState
     track : int
         Number of the track.
     length_m : float
         Length of the track.
-    count : int
-    longest_m : float
 
     Returns
     -------

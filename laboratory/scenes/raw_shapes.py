@@ -43,12 +43,10 @@ def with_bar(
     Parameters
     ----------
     xyz : (n, 3) array
-    width_m : float
     angle : float
         Direction, radians.
     left_m, middle_m : float
         Place of its middle across the line through `MIDDLE`, and along it.
-    height_m, length_m : float
 
     Returns
     -------

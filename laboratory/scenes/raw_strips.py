@@ -27,7 +27,6 @@ class Strip:
     ----------
     xyz : (n, 3) array
     head : (n,) bool array
-    curvature : float
     """
 
     xyz: np.ndarray
@@ -58,14 +57,12 @@ def strip(
 
     Parameters
     ----------
-    length_m, curvature : float
     rails : sequence of Lefts, optional
         A track by default.
     hidden : callable, optional
         Called with places along and the rail's places to the left; says which heads are missing.
     paved : callable, optional
         Called with places along; says where the bed is filled to the tops, with grooves inside.
-    per_m2, noise_m, half_width_m : float
     """
     rng = np.random.RandomState(7)
     count = int(per_m2 * length_m * 2 * half_width_m)

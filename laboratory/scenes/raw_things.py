@@ -100,11 +100,8 @@ def plants(
 
     Parameters
     ----------
-    world : World
-    count : int
     lefts_m : tuple of float
         Range across, from the reference line.
-    height_m, radius_m : tuple of float
     base_m : float
         Where they root, relative to the rails.
     leaves : int

@@ -71,10 +71,8 @@ class Bedding:
         Standard deviation of the ballast's tops.
     terrain_m : float
         Ground beside the bed, below the top of the rails.
-    terrain_roughness_m : float
     slab : bool
         Whether the track lies on concrete, without ballast.
-    sleeper_step_m, sleeper_width_m, sleeper_length_m : float
     heap_m : float
         What the ballast beyond the sleepers' ends is higher than that between them; negative where it has fallen off.
     """
@@ -99,7 +97,6 @@ class Way:
     left_m, top_m, slope, secant : (profiles,) arrays
         Place of the axis to the left of the reference line, height of the rails' tops, sine of the tilt of the plane of
         both rails to the left, and length in the profile of what is 1 m long across the track.
-    spacing_m : float
     """
 
     left_m: np.ndarray
@@ -115,14 +112,8 @@ class World:
 
     Attributes
     ----------
-    reference : Curve
     station : (profiles,) array
         Chainage of each profile.
-    ways : list of Way
-    head_width_m : float
-    bedding : Bedding
-    rng : RandomState
-    half_width_m : float
     crown : float
         Height of the crown of the heads as a share of that of new ones: wear makes them flat.
     shear : float
@@ -365,7 +356,6 @@ def pavement(
 
     Parameters
     ----------
-    world : World
     where : (profiles,) bool array
     groove_m : tuple of float
         Width and depth.

@@ -80,11 +80,6 @@ class Scanner:
 def head_outline(head_width_m: float, profile: Profile = NEW) -> tuple[np.ndarray, np.ndarray]:
     """Return the outline of a railhead in its own frame, from the bottom of the left face to that of the right one.
 
-    Parameters
-    ----------
-    head_width_m : float
-    profile : Profile
-
     Returns
     -------
     outline : (m, 2) array
@@ -136,15 +131,10 @@ def scan(
 
     Parameters
     ----------
-    head : Railhead
-    head_width_m : float
     path : (k, 3) array
         Axis of the track on which the scanner rides, metres.
-    scanner : Scanner
-    rng : RandomState
     missing : tuple of (start, end)
         Sections without points, metres along the head.
-    shape : Profile
 
     Returns
     -------

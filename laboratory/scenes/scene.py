@@ -31,7 +31,6 @@ class Scene:
 
     Attributes
     ----------
-    name : str
     xyz : (n, 3) array
         All points, local metres.
     classification : (n,) uint8 array
@@ -39,7 +38,6 @@ class Scene:
         Tops of the heads on the axes of the heads, local metres: left and right rail of each track in turn.
     centerlines : tuple of (k, 3) array
         Midlines between the tops.
-    standard : RailStandard
     frame : LocalFrame
         Position of the scene in its coordinate system.
     other_gauges_m : tuple of float
@@ -100,14 +98,10 @@ class Plan:
     ----------
     tracks : sequence of Track
         A branch follows the track from which it departs.
-    standard : RailStandard
-    scanner : Scanner
     ridden : int
         Track on which the scanner rides.
     gaps : dict of (track, side) to Gaps
         Sections without points; side is +1 for the left rail and -1 for the right one.
-    clutter : Clutter
-    frame : LocalFrame
     other_gauges_m : tuple of float
         See `Scene`.
     shape : Profile
@@ -127,12 +121,6 @@ class Plan:
 
 def build(name: str, plan: Plan, rng: np.random.RandomState) -> Scene:
     """Scan the rails of a plan, with the guard rails at its frogs, and add its clutter.
-
-    Parameters
-    ----------
-    name : str
-    plan : Plan
-    rng : RandomState
 
     Returns
     -------

@@ -31,7 +31,6 @@ class Pass:
         Error of its position: all its points lie this far to the left and above.
     start_m, end_m : float
         The part of the track that it scans.
-    scanner : Scanner
     """
 
     left_m: float
@@ -48,9 +47,6 @@ def passes(
 
     Parameters
     ----------
-    name : str
-    seed : int
-    of : sequence of Pass
     with_ids : bool
         Whether the points state which pass they are of.
     tracks : int

@@ -24,14 +24,12 @@ def turnout(name: str, form: str, hand: int, heading: float, seed: int, curvatur
 
     Parameters
     ----------
-    name : str
     form : str
         Name of one of `turnouts.FORMS`.
     hand : int
         1: the branch leaves to the left; -1: to the right.
     heading : float
         Direction of the main track, radians.
-    seed : int
     curvature : float
         Curvature of the main track, 1/m.
     """

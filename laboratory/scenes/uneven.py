@@ -45,7 +45,6 @@ def uneven(rng: np.random.RandomState, chainage: np.ndarray) -> np.ndarray:
 
     Parameters
     ----------
-    rng : RandomState
     chainage : (n,) array
         Metres along the track.
     """
@@ -73,12 +72,8 @@ def plain_track(
 
     Parameters
     ----------
-    name : str
-    seed : int
-    scanner : Scanner
     rough : bool
         Whether its rails have waves and welds.
-    shape : Profile
     true_head_m : float
         True width of the heads.
     kept : float

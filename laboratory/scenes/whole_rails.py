@@ -32,12 +32,10 @@ def classified(scene: RawScene, share: float = 1.0, train_share: float = 0.0, se
 
     Parameters
     ----------
-    scene : RawScene
     share : float
         Share of the points on webs and feet that are classified as rail, with all points on heads.
     train_share : float
         The same of wheels and bogies on the rails.
-    seed : int
     """
     rng = np.random.RandomState(seed)
     chance = rng.random_sample(len(scene.kind))

@@ -102,8 +102,6 @@ def evaluate(name: str, cleaner: Cleaner, pairs: list[Pair]) -> Row:
     ----------
     name : str
         For the row of the table.
-    cleaner : Cleaner
-    pairs : list of Pair
     """
     total, started = Scores(), time.perf_counter()
     for pair in pairs:

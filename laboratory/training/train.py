@@ -74,14 +74,12 @@ class Settings:
         Steps of the whole training.
     rate : float
         Largest learning rate.
-    seed : int
     device : str
         "cpu" or "cuda".
     start : Path, optional
         Weights to start from.
     network : str
         One of `networks.NETWORKS`.
-    passes : int
     ratio : float, optional
         Gauge divided by railhead width, to train a specialized model.
     """
@@ -130,10 +128,8 @@ def train(settings: Settings, folder: Path, minutes: float) -> Recurrent | None:
 
     Parameters
     ----------
-    settings : Settings
     folder : Path
         For the checkpoint, from which a training continues, and the log.
-    minutes : float
 
     Returns
     -------
@@ -187,10 +183,8 @@ def batch(settings: Settings, stream: int, step: int) -> tuple[Tensor, Tensor, T
 
     Parameters
     ----------
-    settings : Settings
     stream : int
         One of the streams of random numbers.
-    step : int
 
     Returns
     -------
@@ -224,9 +218,7 @@ def run_passes(network: Recurrent, observed: Tensor, passes: int) -> Iterator[Te
 
     Parameters
     ----------
-    network : Recurrent
     observed : (n, 1, height, width) float tensor
-    passes : int
     """
     state = torch.full_like(observed, START)
     for number in range(passes):

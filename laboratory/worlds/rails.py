@@ -50,7 +50,6 @@ def lay(world: World, tracks: Sequence[Track], where: np.ndarray | None = None) 
 
     Parameters
     ----------
-    world : World
     tracks : sequence of Track
         All run in the direction of the reference line.
     where : (profiles,) bool array, optional

@@ -83,13 +83,10 @@ class Railway:
 
     Attributes
     ----------
-    family, layout : str
-    standard : RailStandard
     tracks : tuple of Track
         The first is ridden by the scanner; all run in its direction.
     plain : bool
         Whether all tracks are parallel throughout.
-    other_gauges_m : tuple of float
     crown : float
         See `raw_world.World`.
     """

@@ -67,13 +67,10 @@ class Surroundings:
 
     Attributes
     ----------
-    bed, land : str
-    bedding : Bedding
     whole : Thing
         Everything that a scanner may see, rails included.
     names : tuple of str
         What was built.
-    half_width_m : float
     rise : callable
         Height of the ground above the tops of the rails, metres, by the place to the left of the reference line.
     paved_m : tuple of float or None
@@ -175,7 +172,6 @@ class Terrain:
 
     Attributes
     ----------
-    land : str
     low_m, high_m : float
         Outermost tracks, to the left of the reference line.
     depth_m : float

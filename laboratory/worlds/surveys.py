@@ -85,9 +85,6 @@ def draw_survey(seed: int, railway: Railway, half_width_m: float, rise: Callable
 
     Parameters
     ----------
-    seed : int
-    railway : Railway
-    half_width_m : float
     rise : callable
         Height of the ground above the rails, by the place to the left: scanners stand on it.
     wide : bool

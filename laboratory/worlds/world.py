@@ -31,11 +31,6 @@ class World:
 
     Attributes
     ----------
-    seed : int
-    railway : Railway
-    surroundings : Surroundings
-    survey : Survey
-    scene : RawScene
     classification : Classification or None
         None of a raw cloud.
     """
@@ -96,7 +91,6 @@ def make(seed: int, cloud: str = RAW) -> World:
 
     Parameters
     ----------
-    seed : int
     cloud : str
         One of `CLOUDS`: the world is the same, and raw or classified.
     """

@@ -97,8 +97,6 @@ class RailAlgorithm(QgsProcessingAlgorithm):
         ----------
         job : object
             What `read` returned.
-        values : ParameterValues
-        progress : Progress
         """
         raise NotImplementedError
 

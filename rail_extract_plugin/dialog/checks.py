@@ -24,7 +24,6 @@ def check_values(definitions: Sequence[QgsProcessingParameterDefinition], values
     ----------
     definitions : sequence of QgsProcessingParameterDefinition
         The algorithm's parameters.
-    values : ParameterValues
 
     Raises
     ------
@@ -52,10 +51,8 @@ def explain_invalid(
     ----------
     parameter : Parameter
         What the definition is made for.
-    definition : QgsProcessingParameterDefinition
     value : object
         As the user entered it; None means the default.
-    context : QgsProcessingContext
     """
     given = definition.defaultValue() if value is None else value
     if definition.checkValueIsAcceptable(given, context) and not _is_no_number(definition, given):

@@ -51,10 +51,8 @@ class ParameterValues(Values):
 
     Parameters
     ----------
-    algorithm : QgsProcessingAlgorithm
     parameters : dict
         Values by name, as QGIS passes them.
-    context : QgsProcessingContext
 
     Attributes
     ----------

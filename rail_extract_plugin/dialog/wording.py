@@ -34,8 +34,6 @@ def with_labels(sentence: str, definitions: Definitions, about: str = "") -> str
 
     Parameters
     ----------
-    sentence : str
-    definitions : sequence of QgsProcessingParameterDefinition
     about : str
         Parameter that the sentence is about. An id is a choice of the one that was named last, or of this one; without
         either it is a word as any other, such as CPU.

@@ -48,8 +48,6 @@ class GrowTask(QgsTask):
 
     Parameters
     ----------
-    cloud : CloudSource
-    standard : RailStandard
     seed : QgsPointXY
         In the coordinate system of the cloud.
     done : callable

@@ -61,10 +61,8 @@ class Seed:
 
     Attributes
     ----------
-    place : QgsPointXY
     crs : QgsCoordinateReferenceSystem
         That of the place: the layer's.
-    bands : list of QgsRubberBand
     """
 
     place: QgsPointXY
@@ -77,10 +75,8 @@ class ClickTool(QgsMapTool):
 
     Parameters
     ----------
-    canvas : QgsMapCanvas
     clicked : callable
         Called with a place in the coordinate system of the map.
-    undo, accept : callable
     """
 
     def __init__(
@@ -114,14 +110,7 @@ class ClickTool(QgsMapTool):
 
 
 class GrowRails(QObject):
-    """Grows rails from clicks on a point cloud layer.
-
-    Parameters
-    ----------
-    canvas : QgsMapCanvas
-    messages : QgsMessageBar
-    parent : QWidget
-    """
+    """Grows rails from clicks on a point cloud layer."""
 
     def __init__(
         self,

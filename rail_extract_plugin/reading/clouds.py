@@ -28,7 +28,6 @@ def cloud_source(value: Any, context: QgsProcessingContext) -> CloudSource:
     ----------
     value : QgsPointCloudLayer, QgsProperty or str
         A layer, the name or id of a loaded layer, or the path of a file, a folder or a virtual point cloud.
-    context : QgsProcessingContext
 
     Raises
     ------

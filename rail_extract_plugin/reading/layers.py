@@ -56,12 +56,6 @@ class LayerSource(Source):
     ----------
     name : str
         Of its parameter.
-    source : QgsProcessingFeatureSource
-    context : QgsProcessingContext
-
-    Attributes
-    ----------
-    source : QgsProcessingFeatureSource
     """
 
     def __init__(self, name: str, source: QgsProcessingFeatureSource, context: QgsProcessingContext) -> None:

@@ -36,12 +36,10 @@ class Panel:
 
     Attributes
     ----------
-    box : QRectF
     right, up : float
         Middle, metres.
     width_m, height_m : float
         What is seen at least.
-    title : str
     """
 
     box: QRectF

@@ -61,7 +61,6 @@ class Picture:
     rails : (k, 2) array
     missing : (k,) bool array
         Whether a rail has no points here: it is where the line is drawn, or opposite to the other one.
-    head_width_m : float
     note : str
         What is missing, and why.
     """
@@ -74,13 +73,7 @@ class Picture:
 
 
 class Sections:
-    """The cross-sections of a layer of findings.
-
-    Parameters
-    ----------
-    layer : QgsVectorLayer
-    found : sequence of Review
-    """
+    """The cross-sections of a layer of findings."""
 
     def __init__(self, layer: QgsVectorLayer, found: Sequence[Review]) -> None:
         self.cloud = cloud_of(layer)
@@ -161,7 +154,6 @@ class ReadingTask(QgsTask):
 
     Parameters
     ----------
-    cloud : RunCloud
     places : mapping of int to (3,) array
     done : callable
         Called in the main thread with the points by id, and with a sentence if they could not be read.

@@ -52,7 +52,6 @@ def after_failure(dialog: RunDialog, failure: type | None, standard: str) -> Ite
 
     Parameters
     ----------
-    dialog : RunDialog
     failure : type or None
         Class of the error.
     standard : str

@@ -54,11 +54,6 @@ EXTRACT = "extractrails"
 class RunDialog(AlgorithmDialog):
     """Opens on an algorithm of the plugin.
 
-    Parameters
-    ----------
-    algorithm : QgsProcessingAlgorithm
-    parent : QWidget, optional
-
     Attributes
     ----------
     given : dict of str to object

@@ -69,7 +69,6 @@ def explain_missing(label: str, packages: Sequence[Package], usable: Sequence[st
     ----------
     label : str
         Label of the algorithm.
-    packages : sequence of Package
     usable : sequence of str
         Labels of the algorithms whose packages are all installed.
     """

@@ -73,7 +73,6 @@ class Pip:
 
     Parameters
     ----------
-    interpreter : Interpreter
     temporary : Path
         Folder for temporary files.
     folders : sequence of Path
@@ -139,8 +138,6 @@ class Pip:
         ----------
         names : sequence of str
             What is installed, for the message.
-        arguments : sequence of str
-        progress : Progress
 
         Raises
         ------
@@ -188,13 +185,10 @@ def install(order: Order, interpreter: Interpreter, folder: Path, others: Sequen
 
     Parameters
     ----------
-    order : Order
-    interpreter : Interpreter
     folder : Path
         Created if it does not exist.
     others : sequence of Path
         Other folders of packages that QGIS uses.
-    progress : Progress
 
     Returns
     -------

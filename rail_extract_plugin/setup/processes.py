@@ -41,7 +41,6 @@ def run(
     ----------
     program : str
         Absolute path.
-    arguments : sequence of str
     changes : mapping, optional
         Environment variables that differ from those of QGIS.
     progress : Progress

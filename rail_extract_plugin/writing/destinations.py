@@ -52,7 +52,6 @@ def destinations(values: Mapping[str, Any], context: QgsProcessingContext) -> di
     ----------
     values : mapping of str to str, QgsProperty, QgsProcessingOutputLayerDefinition or None
         Value of each destination parameter.
-    context : QgsProcessingContext
 
     Returns
     -------

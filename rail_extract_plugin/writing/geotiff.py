@@ -27,11 +27,8 @@ def write_rasters(path: Path, header: RasterHeader, rasters: Sequence[RailRaster
 
     Parameters
     ----------
-    path : Path
-    header : RasterHeader
     rasters : sequence of RailRaster
         One for each class of the header.
-    progress : Progress
 
     Raises
     ------

@@ -58,13 +58,7 @@ def fields(columns: Sequence[Field]) -> QgsFields:
 
 
 def features(layer: Layer, frame: LocalFrame) -> Iterator[QgsFeature]:
-    """Convert the features of a layer to those of QGIS, in the cloud's coordinates.
-
-    Parameters
-    ----------
-    layer : Layer
-    frame : LocalFrame
-    """
+    """Convert the features of a layer to those of QGIS, in the cloud's coordinates."""
     make = _line if layer.product.is_line else _point
     for places, xyz, *row in zip(layer.places(frame), layer.xyz, *layer.written_columns()):
         feature = QgsFeature()
@@ -131,10 +125,8 @@ def write_layer(values: ParameterValues, name: str, layer: AnyLayer, frame: Loca
 
     Parameters
     ----------
-    values : ParameterValues
     name : str
         Name of the output.
-    layer : Layer or Copy
     frame : LocalFrame
         Local frame of the layer.
 
@@ -171,7 +163,6 @@ def layer_writers(
 
     Parameters
     ----------
-    makers : mapping of str to callable
     values, frame
         See `write_layer`.
     """
@@ -191,9 +182,6 @@ def write_raster(
     ----------
     values, name
         See `write_layer`.
-    header : RasterHeader
-    rasters : sequence of RailRaster
-    progress : Progress
 
     Returns
     -------

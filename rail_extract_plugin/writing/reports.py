@@ -19,7 +19,6 @@ def write_shown(values: ParameterValues, build: Callable[[], str], name: str = R
 
     Parameters
     ----------
-    values : ParameterValues
     build : callable
         Returns the page.
     name : str
@@ -49,7 +48,6 @@ def write_check(values: ParameterValues, verdict: str, facts: Mapping[str, str])
 
     Parameters
     ----------
-    values : ParameterValues
     verdict : str
         A sentence.
     facts : mapping of str to str

@@ -40,11 +40,8 @@ class RunCloud:
 
     Attributes
     ----------
-    paths : tuple of str
-    class_codes : tuple of int
     crs_wkt : str or None
         Coordinate system for files that state none.
-    head_width_m : float
     units_m : tuple of float
         Lengths of the units of x, y and z.
     """
@@ -71,7 +68,6 @@ def new_run(tool: str, value: Any, context: QgsProcessingContext) -> dict[str, s
         Label of the algorithm.
     value : object
         Value of its main input, which gives the layers their names: that of the layer, or of the file.
-    context : QgsProcessingContext
     """
     value = value.source if isinstance(value, QgsProcessingFeatureSourceDefinition) else value
     value = value.valueAsString(context.expressionContext())[0] if isinstance(value, QgsProperty) else value

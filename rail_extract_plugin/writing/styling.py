@@ -138,10 +138,8 @@ def style_on_load(
 
     Parameters
     ----------
-    layer_id : str
     style : str
         Name of a .qml file of the plugin, without its suffix.
-    context : QgsProcessingContext
     properties : mapping of str to str
         To be stored with the layer.
     title : str

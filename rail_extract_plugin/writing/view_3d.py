@@ -21,7 +21,6 @@ def show_lines_in_3d(layer: QgsVectorLayer, style: str) -> None:
 
     Parameters
     ----------
-    layer : QgsVectorLayer
     style : str
         Name of the layer's style; other layers than those in `COLORS` stay as they are.
     """

@@ -40,7 +40,6 @@ def write_whole(
     ----------
     value : str, QgsProperty, QgsProcessingOutputLayerDefinition or None
         Value of the destination parameter.
-    context : QgsProcessingContext
     destination : Destination or None
         The file that the value names.
     write : callable
@@ -93,7 +92,6 @@ def write_each(writers: Mapping[str, Callable[[], dict[str, str]]], values: Para
     ----------
     writers : mapping of str to callable
         Function that writes an output, by its name; returns the path or id by that name, or nothing if skipped.
-    values : ParameterValues
 
     Raises
     ------

@@ -32,7 +32,6 @@ class Kind:
 
     Attributes
     ----------
-    name : str
     make : callable
         Writes good files into a folder, and returns those to be damaged.
     read : callable
@@ -54,10 +53,8 @@ class Kind:
 
         Parameters
         ----------
-        folder : Path
         good : sequence of Path
             From `make`.
-        seed : int
         """
         rng = random.Random(f"{self.name}:{seed}")
         path = self.copied(folder, rng.choice(list(good)))

@@ -6,7 +6,6 @@ from heard import Heard
 from rail_extract.core.clouds.las import laspy
 from rail_extract.core.clouds.points import ask
 from rail_extract.core.clouds.vpc import list_tiles
-from rail_extract.core.errors import ParameterError, RailExtractError
 from rail_extract.core.grow import growth as many_seeds
 from rail_extract.core.grow.follow import Reason
 from rail_extract.core.grow.settings import GrowSettings
@@ -116,20 +115,3 @@ def test_places_of_a_line_outside_of_the_cloud_are_not_looked_at(tmp_path, monke
     assert result.figures.paired_m == pytest.approx(47.0, abs=2.5)
     assert len(looked_at) < 5
     assert not any("not on a rail" in text for text in progress.warnings)
-
-
-def test_only_rails_are_written_on_request(tmp_path):
-    source = save(tmp_path / "raw.las", TRACK.xyz)
-    result, _ = grow(tmp_path, [source], tmp_path / "new.las", [SEED], Choice(20, only_rails=True, reset=False))
-    cloud = laspy.read(result.file)
-    assert len(cloud.points) == result.figures.points
-    assert np.all(cloud.classification == 20)
-
-
-def test_seeds_elsewhere_are_refused(tmp_path):
-    source = save(tmp_path / "raw.las", TRACK.xyz)
-    with pytest.raises(ParameterError, match="No seed is in the cloud"):
-        grow(tmp_path, [source], tmp_path / "new.las", [[12.0, 50.0]])
-    with pytest.raises(RailExtractError, match=r"No seed is on a rail: put seeds within 0\.25 m"):
-        grow(tmp_path, [source], tmp_path / "new.las", [CORNER[:2] + TRACK.at(12.0, 0.0)])
-    assert not (tmp_path / "new.las").exists()

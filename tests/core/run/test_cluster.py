@@ -1,7 +1,6 @@
 """Extraction on real workers: the lines of one process, even if workers die, disks are full or versions differ."""
 
 import os
-import resource
 import signal
 import threading
 import time
@@ -11,7 +10,6 @@ import pytest
 from distributed import Client, KilledWorker, LocalCluster
 from heard import Heard
 from rail_extract.core.clouds.points import ask, read_rail_points
-from rail_extract.core.errors import DiskError
 from rail_extract.core.pipeline import Parameters, extract_files, extract_rails
 from rail_extract.core.pipeline.sources import Classified
 from rail_extract.core.progress import SILENT
@@ -175,16 +173,6 @@ def test_damaged_results_are_computed_again_with_a_warning(tiles, one_process, e
     )
     assert len([text for text in heard.warnings if text.startswith("The stored points of tile")]) == 1
     assert {file: file.stat().st_size for file in tmp_path.glob("*.npz")} == sizes
-
-
-def test_a_full_work_folder_is_one_sentence(tiles, tmp_path):
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, hard))
-    try:
-        with pytest.raises(DiskError, match="free space"):
-            spool(ask(tiles, [RAIL]), square_side(PARAMETERS), tmp_path)
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
 def first_of(name, context):
