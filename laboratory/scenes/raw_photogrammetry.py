@@ -226,7 +226,7 @@ def _surface(world: World, camera: Photogrammetry) -> Surface:
 
 
 def from_above(segments: Segments, profiles: int, half_width_m: float) -> tuple[np.ndarray, np.ndarray]:
-    """Height and kind of what lies uppermost in each cell, (profiles, cells) each; cells without anything are filled."""
+    """Height and kind of what lies uppermost in each cell, (profiles, cells) each; empty cells are filled."""
     cells = int(round(2 * half_width_m / CELL_M))
     height, kind = np.full((profiles, cells), np.nan, dtype=np.float32), np.zeros((profiles, cells), dtype=np.uint8)
     borders = np.searchsorted(segments.profile, np.arange(0, profiles + CHUNK, CHUNK))
