@@ -36,16 +36,9 @@ QUOTED = 40
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of numbers.
+    """A kind of numbers between `low` and `high`, in the unit in which they are stated; `zero` says if one may be 0.
 
-    Attributes
-    ----------
-    low, high : float
-        Smallest and largest number, in the unit in which it is stated.
-    says : str
-        What such a number may be, for messages.
-    zero : bool
-        Whether it may be 0.
+    Messages say what such a number may be with `says`.
     """
 
     low: float
@@ -72,25 +65,12 @@ TURNS = Kind(0.0, MAX_TURNS, f"an element turns by up to {MAX_TURNS:g} revolutio
 
 
 def checked(value: float, kind: Kind, where: str, name: str) -> float:
-    """Return a number if it is of a kind.
-
-    Parameters
-    ----------
-    where, name : str
-        What states the number, and as what, for the message.
-
-    Raises
-    ------
-    DesignNumberError
+    """Return a number if it is of a kind; `where` states it as `name`, for the message of the DesignNumberError.
 
     Examples
     --------
     >>> checked(12.5, LENGTH, "Curve 3", "length")
     12.5
-    >>> checked(-139, LENGTH, "Curve 3", "length")
-    Traceback (most recent call last):
-    rail_extract.core.errors.DesignNumberError: Curve 3 has the length -139, but lengths are above 0 and up to 10,000 \
-km: correct it.
     """
     if kind.holds(value):
         return value

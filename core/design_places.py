@@ -17,13 +17,7 @@ MAX_SPIKE_M = 10_000.0
 
 
 def check_places(xy: np.ndarray, where: str, unit_m: float = 1.0) -> np.ndarray:
-    """Return places, (n, 2), in units of `unit_m` metres, if all are on the map.
-
-    Raises
-    ------
-    DesignNumberError
-        One has a coordinate that is larger, or not a number; `where` names what has them.
-    """
+    """Return places, (n, 2), in units of `unit_m` metres, if all are on the map; `where` has them, for the message."""
     wrong = xy[~are_places(xy, unit_m)]
     for value in wrong.ravel() if len(wrong) else ():
         checked(float(value) * unit_m, NUMBER, where, "coordinate")
@@ -36,12 +30,7 @@ def are_places(xy: np.ndarray, unit_m: float = 1.0) -> np.ndarray:
 
 
 def check_line(xy: np.ndarray, where: str, unit_m: float = 1.0) -> np.ndarray:
-    """Return the vertices of a guide, (n, 2) in units of `unit_m` metres, if they are on the map and none is stray.
-
-    Raises
-    ------
-    DesignNumberError
-    """
+    """Return the vertices of a guide, (n, 2) in units of `unit_m` metres, if they are on the map and none is stray."""
     check_places(xy, where, unit_m)
     checked(Polyline(xy).length_m * unit_m, LENGTH, where, "length")
     if has_stray(xy * unit_m):

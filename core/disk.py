@@ -47,12 +47,7 @@ tries. Then it continues: anybody who can read a folder can lock it."""
 
 @contextmanager
 def writing(folder: Path) -> Iterator[None]:
-    """Turn an `OSError` while writing into a folder into one sentence.
-
-    Raises
-    ------
-    DiskError
-    """
+    """Turn an `OSError` while writing into a folder into one sentence, that of a DiskError."""
     try:
         yield
     except OSError as error:
@@ -63,12 +58,7 @@ def writing(folder: Path) -> Iterator[None]:
 
 
 def check_closed(path: Path) -> None:
-    """Refuse to replace a GeoPackage that another program is writing to: its pending changes would damage the new file.
-
-    Raises
-    ------
-    DiskError
-    """
+    """Refuse to replace a GeoPackage that another program is writing to: pending changes would damage the new file."""
     for log in (path.with_name(path.name + end) for end in LOGS):
         if log.exists() and log.stat().st_size:
             raise DiskError(
@@ -80,16 +70,8 @@ def check_closed(path: Path) -> None:
 class Destination:
     """A file that a run will write, and the file that was there when the run began.
 
-    Several outputs that go into one file share one destination.
-
-    Attributes
-    ----------
-    path : Path
-        As the user named it.
-    file : Path
-        The file itself, if `path` is a symbolic link.
-    before : tuple of int or None
-        Identity of the file that this run found, or has written.
+    Several outputs that go into one file share one destination. `path` is as the user named it, `file` the file itself
+    if that is a symbolic link, and `before` the identity of the file that this run found, or has written.
     """
 
     path: Path
@@ -100,11 +82,8 @@ class Destination:
     def at(cls, path: Path) -> Destination:
         """Check that a file can be written, as far as that can be known before, and remember the old one.
 
-        Raises
-        ------
-        DiskError
-            Its folder or the old file is not writable, something other than a file has this name, or the old file is
-            open in another program.
+        Raises DiskError if its folder or the old file is not writable, something other than a file has this name, or
+        the old file is open in another program.
         """
         try:
             file = Path(os.path.realpath(path))
@@ -119,22 +98,12 @@ class Destination:
     def replacing(self, edit: bool = False) -> Iterator[Path]:
         """Move a file, and all files that are written next to it, to their names when the block ends without an error.
 
-        Parameters
-        ----------
-        edit : bool
-            Whether to begin with a copy of the old file, or of the files of a shapefile.
+        Yields the name in a temporary folder under which to write the file; with `edit`, it begins with a copy of the
+        old file, or of the files of a shapefile. An `OSError` in the block becomes a `DiskError`; one that states only
+        a text may stand for the error of a library.
 
-        Yields
-        ------
-        Path
-            The name in a temporary folder under which to write the file. An `OSError` in the block becomes a
-            `DiskError`; one that states only a text may stand for the error of a library.
-
-        Raises
-        ------
-        DiskError
-            The disk is full, the old file is open elsewhere, or another run has replaced it in the meantime. The old
-            file is then kept, and the new files are left next to it with `_new` in their names.
+        Raises DiskError if the disk is full, the old file is open elsewhere, or another run has replaced it in the
+        meantime. The old file is then kept, and the new files are left next to it with `_new` in their names.
         """
         try:
             with scratch_folder(self.file.parent) as folder:
@@ -151,13 +120,7 @@ class Destination:
             raise _unwritable(self.path, error) from error
 
     def write_text(self, text: str) -> None:
-        """Write a text file.
-
-        Raises
-        ------
-        DiskError
-            See `replacing`.
-        """
+        """Write a text file, as in `replacing`."""
         with self.replacing() as new:
             new.write_text(text, encoding="utf-8")
 
@@ -193,12 +156,8 @@ class Destination:
 def replace_folder(scratch: Path, target: Path) -> None:
     """Move a new folder, in the folder `NEW` of a temporary one, to its name next to it, where an old one may be.
 
-    If the run is killed in between, the next one that writes there completes it.
-
-    Raises
-    ------
-    OSError
-        It can't be moved. The old folder is in its place again.
+    If the run is killed in between, the next one that writes there completes it. After an OSError, the old folder is in
+    its place again.
     """
     new, old = scratch / NEW / target.name, scratch / OLD / target.name
     old.parent.mkdir()
@@ -261,12 +220,7 @@ def _swap(folder: Path, main: Path, names: Sequence[Path]) -> None:
 
     If there are several new files, the main one, which opens the set, is missing from the first move to the last: a set
     that is not complete cannot be opened. Files of `names` that are no longer in the temporary folder have been moved
-    already.
-
-    Raises
-    ------
-    OSError
-        A file can't be replaced because it is open elsewhere. All old files are in their places again.
+    already. After an OSError, as of a file that is open elsewhere, all old files are in their places again.
     """
     new, old = folder / NEW, folder / OLD
     waiting = [name for name in names if (new / name.name).exists()]

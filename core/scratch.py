@@ -35,11 +35,6 @@ def scratch_folder(parent: Path) -> Iterator[Path]:
 
     Its name is unpredictable, and creating it fails if anything has this name, so that nobody can direct the files
     elsewhere with a symbolic link.
-
-    Raises
-    ------
-    OSError
-        The folder cannot be created.
     """
     folder = parent / f"{PREFIX}{secrets.token_hex(6)}"
     folder.mkdir(OWNER_ONLY)
@@ -56,13 +51,7 @@ def scratch_folder(parent: Path) -> Iterator[Path]:
 
 
 def sweep(parent: Path, rescue: Callable[[Path], None] | None = None) -> None:
-    """Remove the temporary folders that killed processes of this user have left.
-
-    Parameters
-    ----------
-    rescue : callable, optional
-        Called with each such folder before it is removed.
-    """
+    """Remove the temporary folders that killed processes of this user have left; `rescue` gets each of them before."""
     with suppress(OSError):
         for entry in os.scandir(parent):
             if NAME.fullmatch(entry.name) and entry.is_dir(follow_symlinks=False) and _is_abandoned(Path(entry)):

@@ -48,18 +48,10 @@ EDGE_M = 0.01
 
 @dataclass(frozen=True)
 class Sections:
-    """What each section of `STATION_M` shows.
+    """What each section of `STATION_M` shows, (n,) arrays, and the fit there.
 
-    Attributes
-    ----------
-    offset, sigma : (n,) arrays
-        Middle of the track to the left of the axis, and its standard error, metres.
-    found : Fit
-        The fit there.
-    points : (n,) array
-        On the bed.
-    shows : (n,) bool array
-        Whether it shows two rails.
+    `offset` is the middle of the track to the left of the axis and `sigma` its standard error, metres; `points` are
+    those on the bed, and `shows` holds where there are two rails.
     """
 
     offset: np.ndarray

@@ -38,16 +38,8 @@ must show."""
 def survey_files(run: Run, guides: Sequence[Guide]) -> Survey:
     """Find the track of each guide in a cloud.
 
-    Raises
-    ------
-    CloudError
-        A file is damaged, or the cloud is one of mobile lidar.
-    DiskError
-        The disk is full.
-    NoRailPointsError
-        No point of these classes lies along the guides.
-    ParameterError
-        No guide lies in the cloud, or one is too short.
+    Raises CloudError if a file is damaged or the cloud is one of mobile lidar, NoRailPointsError if no point of these
+    classes lies along the guides, and ParameterError if no guide lies in the cloud, or one is too short.
     """
     request, parameters, progress = run.request, run.parameters, run.progress
     _check_degrees(request, guides)

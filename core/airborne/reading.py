@@ -51,16 +51,9 @@ PLACE_M = 2.0
 
 @dataclass(frozen=True)
 class Run:
-    """A run on an airborne cloud.
+    """A run on an airborne cloud: one task per file and one per square.
 
-    Attributes
-    ----------
-    request : Request
-        Files, classes and extent.
-    folder : Path
-        Folder for points, 28 bytes for each around the guides; the caller removes it.
-    runner : Runner
-        Executes one task per file and one per square.
+    The caller removes the folder, which holds 28 bytes for each point around the guides.
     """
 
     request: Request
@@ -72,16 +65,9 @@ class Run:
 
 @dataclass(frozen=True)
 class Piece:
-    """A part of a guide.
+    """The part of guide `number` in a square, whose stations are those between two chainages of the guide.
 
-    Attributes
-    ----------
-    number : int
-        Of the guide.
-    axis : Polyline
-        With its margins; its first chainage is a multiple of `STATION_M`.
-    first_m, last_m : float
-        Chainages of the guide between which stations belong to the square.
+    The axis has margins, and its first chainage is a multiple of `STATION_M`.
     """
 
     number: int

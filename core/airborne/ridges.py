@@ -47,20 +47,11 @@ UNSEEN_VARIANCE = 1e9
 
 @dataclass(frozen=True)
 class Shape:
-    """Ridges as they are expected.
+    """Ridges as they are expected, metres.
 
-    Attributes
-    ----------
-    spacing_m : float
-        Distance between the middles of the railheads.
-    width_m, height_m : float
-        Standard deviation and height of a ridge.
-    noise_m : float
-        Standard deviation of a point's height.
-    rough_m : float
-        What averaging does not remove in a bin: sleepers and stones.
-    height_spread : float
-        Standard deviation of the height, as a share of it.
+    `spacing_m` is the distance between the middles of the railheads, `width_m` the standard deviation of a ridge, and
+    `height_m` its height, with the standard deviation `height_spread` as a share of it. A point's height has the
+    standard deviation `noise_m`; `rough_m` is what averaging does not remove in a bin: sleepers and stones.
     """
 
     spacing_m: float
@@ -92,20 +83,12 @@ class Shape:
 
 @dataclass(frozen=True)
 class Fit:
-    """Fits of two ridges at many places.
+    """Fits of two ridges at many places, arrays of one shape.
 
-    Attributes
-    ----------
-    gain : array
-        Log-likelihood of two rails above that of a bed without them; the smaller rail counts twice.
-    both : array
-        The same without a check of the single rails: smooth along the places.
-    flaw : array
-        Loss of the bed beyond that of a flat one.
-    most : array
-        Gain of rails of the expected height, which no noise disturbs.
-    height, level, tilt : arrays
-        Height of the ridges, of the bed in the middle, and the rise of the bed per metre to the left.
+    `gain` is the log-likelihood of two rails above that of a bed without them, in which the smaller rail counts twice,
+    and `both` the same without a check of the single rails: smooth along the places. `flaw` is the loss of the bed
+    beyond that of a flat one, `most` the gain of rails of the expected height, which no noise disturbs. `height` is
+    that of the ridges, `level` that of the bed in the middle, and `tilt` its rise per metre to the left.
     """
 
     gain: np.ndarray
@@ -130,15 +113,9 @@ CHECKED = [
 
 
 def fit(count: np.ndarray, height: np.ndarray, u: np.ndarray, shape: Shape, passes: int = 2) -> Fit:
-    """Fit bed and ridges to bins across the track.
+    """Fit bed and ridges to bins at distances `u`, (k,), from a place: number and mean height of the points, (..., k).
 
-    Parameters
-    ----------
-    count, height : (..., k) arrays
-        Number and mean height of the points in bins at distances `u` from a place.
-    u : (k,) array
-    passes : int
-        Robust weightings; the first is that of clean bins.
+    Of the robust weightings, `passes`, the first is that of clean bins.
     """
     columns = _columns(u, shape).astype(height.dtype)
     variance = np.where(count > 0, shape.noise_m**2 / np.maximum(count, 1) + shape.rough_m**2, UNSEEN_VARIANCE)
@@ -169,12 +146,8 @@ def _columns(u: np.ndarray, shape: Shape) -> np.ndarray:
 class _Normal:
     """Normal equations of weighted bins, from which the bed has been eliminated.
 
-    Attributes
-    ----------
-    product : dict
-        Products of two columns, by their numbers; after the elimination, what the bed leaves of them.
-    data : dict
-        Products of each column and the heights, likewise.
+    `product` holds the products of two columns by their numbers, after the elimination what the bed leaves of them;
+    `data` those of each column and the heights.
     """
 
     def __init__(

@@ -24,14 +24,9 @@ least this far apart."""
 
 @dataclass(frozen=True)
 class Beside:
-    """Places on and beside a line, for the `LONG` sections around each section.
+    """Places `across`, (c,), to the left of a line and on it, for the `LONG` sections around each section.
 
-    Attributes
-    ----------
-    across : (c,) array
-        Distances to the left.
-    gain, flaw, most : (n, c) arrays
-        See `ridges.Fit`.
+    `gain`, `flaw` and `most`, (n, c), are those of `ridges.Fit`.
     """
 
     across: np.ndarray

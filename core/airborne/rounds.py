@@ -32,17 +32,7 @@ SHIFT_LENGTH_M, STRIP_SHIFT_M = 50.0, 0.1
 
 @dataclass(frozen=True)
 class Traced:
-    """A track whose course is known to half a metre.
-
-    Attributes
-    ----------
-    points : Points
-        Around the guide.
-    across : (sections,) array
-        Course of the track, see `search.Course`.
-    shape : Shape
-        Ridges as they are expected.
-    """
+    """A track whose course, `across` as in `search.Course`, is known to half a metre, and its ridges as expected."""
 
     points: Points
     guide: Polyline
@@ -52,16 +42,9 @@ class Traced:
 
 @dataclass(frozen=True)
 class Seen:
-    """What shows along a line.
+    """What shows along a line, with the ridges as they were measured.
 
-    Attributes
-    ----------
-    axis : Polyline
-        The line.
-    shape : Shape
-        Ridges as they were measured.
-    shown_m : float
-        Distance of the rails that the points show where it is clearly not the expected one, else NaN.
+    `shown_m` is the distance of the rails that the points show where it is clearly not the expected one, else NaN.
     """
 
     axis: Polyline
@@ -78,16 +61,9 @@ class Seen:
 
 @dataclass(frozen=True)
 class Refined:
-    """A line that was fitted.
+    """A line through a fitted curve, and what was seen along the curve before the last round.
 
-    Attributes
-    ----------
-    seen : Seen
-        Along the curve before the last round.
-    line : Polyline
-        Through the curve.
-    bed, sigma_bed : (n,) arrays
-        Height of the bed in the middle of the track, and its standard error.
+    `bed` and `sigma_bed`, (n,), are the height of the bed in the middle of the track and its standard error.
     """
 
     seen: Seen

@@ -32,16 +32,10 @@ SAME_OTHER_M = 1.0
 
 @dataclass(frozen=True)
 class Guide:
-    """A line that says which track is meant.
+    """A line, `xy` (n, 2) in units of the cloud's coordinate system, that says which track is meant.
 
-    Attributes
-    ----------
-    xy : (n, 2) array
-        Units of the cloud's coordinate system.
-    gauge_m : float or None
-        Gauge of this track, such as OpenStreetMap states it; None for that of the run.
-    name, ref : str
-        What the layer says of it, which is carried over.
+    `gauge_m` is the gauge of this track, such as OpenStreetMap states it; None for that of the run. `name` and `ref`
+    are carried over from the layer.
     """
 
     guide_id: int
@@ -68,15 +62,7 @@ def gauge_of(text: object) -> float | None:
 
 @dataclass(frozen=True)
 class OtherTrack:
-    """A track beside another one, without a guide.
-
-    Attributes
-    ----------
-    first_m, last_m : float
-        Chainages along the guide.
-    left_m : float
-        Mean distance to the left.
-    """
+    """A track without a guide, on average `left_m` to the left of another one, between two chainages of the guide."""
 
     first_m: float
     last_m: float
@@ -143,13 +129,7 @@ class AirborneTrack:
 
 @dataclass(frozen=True)
 class AirborneLine:
-    """A centerline where its track is seen; fields as in `fields.AIRBORNE_FIELDS`.
-
-    Attributes
-    ----------
-    xyz : (n, 3) array
-        Local metres.
-    """
+    """A centerline, `xyz` (n, 3) local metres, where its track is seen; fields as in `fields.AIRBORNE_FIELDS`."""
 
     xyz: np.ndarray
     track_id: int
@@ -166,15 +146,7 @@ class AirborneLine:
 
 @dataclass(frozen=True)
 class Survey:
-    """What a run has found.
-
-    Attributes
-    ----------
-    tracks : tuple of AirborneTrack
-        One for each guide.
-    density : float
-        Points per square metre along the guides.
-    """
+    """What a run has found: a track for each guide, its lines, and the points per square metre along the guides."""
 
     tracks: tuple[AirborneTrack, ...]
     lines: tuple[AirborneLine, ...]
@@ -259,12 +231,7 @@ def lines_of(
 ) -> tuple[tuple[AirborneTrack, ...], tuple[AirborneLine, ...]]:
     """Draw the lines of tracks where they are seen, and number the stations by them.
 
-    Parameters
-    ----------
-    gauge_mm : float
-        That of the run, for guides that state none.
-    hints : bool
-        Whether the cloud is too sparse for more.
+    `gauge_mm` is for guides that state none; with `hints` the cloud is too sparse for more.
     """
     numbered: list[AirborneTrack] = []
     lines: list[AirborneLine] = []

@@ -23,14 +23,9 @@ BESIDE_M = 2.0
 class Deviations:
     """How far a track lies off its design, by the metre.
 
-    Attributes
-    ----------
-    s : (n,) array
-        Distance along the design, metres.
-    xyz : (n, 3) array
-        Place on the design, local metres.
-    slew_mm, lift_mm, cant_diff_mm : (n,) array
-        Measured minus design: across, positive to the left; in height; of the cant. NaN where unknown.
+    `s`, (n,), is the distance along the design, metres, and `xyz`, (n, 3), the place on it, local metres. Slew, lift
+    and difference of the cant, (n,), are measured minus design: across, positive to the left, and in height; NaN where
+    unknown.
     """
 
     track_id: Optional[int]
@@ -60,10 +55,7 @@ def compared_with(
 ) -> list[tuple[Alignment, Deviations]]:
     """Return the deviations of each track, in the frame of the alignments, with the alignment beside it.
 
-    Raises
-    ------
-    RailExtractError
-        None lies along an alignment; of some that do not, the user is told.
+    Raises RailExtractError if none lies along an alignment; of some that do not, the user is told.
     """
     found, lost = [], []
     for track in tracks:
@@ -83,19 +75,11 @@ def compared_with(
 def deviations_of(
     alignment: Alignment, track_id: Optional[int], xyz: np.ndarray, along: np.ndarray, cant: np.ndarray
 ) -> Deviations:
-    """Return how far a line lies off an alignment, interpolated between its vertices.
+    """Return how far a line, `xyz` (n, 3) in local metres, lies off an alignment, interpolated between its vertices.
 
-    Parameters
-    ----------
-    track_id : int or None
-        Of the line.
-    xyz : (n, 3) array
-        Vertices of the line, local metres of the alignment; some of them beside it. The line may run against it.
-    along : (n,) array
-        Plan distance of the vertices from the first one, metres.
-    cant : (k, 2) array
-        Plan distance from the first vertex, increasing, and cant there, left rail minus right rail along the line,
-        metres; empty if it is unknown.
+    Some vertices may lie beside the alignment, and the line may run against it. `along`, (n,), is the plan distance of
+    the vertices from the first one; `cant`, (k, 2), holds plan distance, increasing, and cant there, left rail minus
+    right rail along the line, metres; empty if it is unknown.
     """
     foot = alignment.foot(xyz[:, :2])
     inside = foot.past_m == 0

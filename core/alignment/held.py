@@ -30,10 +30,7 @@ BENT = ("arc", "parabola", "ramp")
 class Given:
     """The structure that a table states.
 
-    Attributes
-    ----------
-    poses : (e, 3) array, optional
-        Place and direction at the start of each element in plan; else they are those of the line.
+    `poses`, (e, 3), is the place and direction at the start of each element in plan; None for those of the line.
     """
 
     chain: Chain

@@ -119,14 +119,9 @@ SINGULAR = 1e-13
 
 @dataclass(frozen=True)
 class Errors:
-    """Standard errors.
+    """Standard errors of elements, (e,) arrays: of the length and of the start, metres, and of the bend, 1/m.
 
-    Attributes
-    ----------
-    bend : (e,) array
-        Of the bend of each element, 1/m; 0 where it is straight, NaN where it changes.
-    length, s : (e,) array
-        Of the length of each element and of its start, metres.
+    That of the bend is 0 where the element is straight, NaN where the bend changes.
     """
 
     bend: np.ndarray

@@ -34,17 +34,11 @@ TURNS_BACK_RAD = np.pi / 3.0
 
 @dataclass(frozen=True)
 class Track:
-    """A measured track.
+    """A measured track: vertices of the centerline, `xyz` (n, 3), local metres.
 
-    Attributes
-    ----------
-    xyz : (n, 3) array
-        Vertices of the centerline, local metres.
-    cant : (k, 2) array
-        Plan distance from the first vertex, increasing, and cant there, left rail minus right rail; metres. Empty if it
-        is unknown.
-    is_bridged : (n,) bool array
-        Whether the line bridges a gap at the vertex; such vertices do not count.
+    `cant`, (k, 2), holds the plan distance from the first vertex, increasing, and the cant there, left rail minus right
+    rail, metres; it is empty if the cant is unknown. Vertices at which the line bridges a gap, `is_bridged` (n,), do
+    not count.
     """
 
     track_id: int
@@ -66,10 +60,7 @@ def with_stations(track_id: int, xyz: np.ndarray, stations: np.ndarray) -> Track
 def stations_by_track(rows: Iterable[Mapping[str, Any]], fields: Collection[str], name: str) -> dict[int, np.ndarray]:
     """Return chainage, cant and whether a gap is bridged of the stations of each track, (n, 3); NaN without cant.
 
-    Raises
-    ------
-    ParameterError
-        A field is missing in the layer of this name.
+    Raises ParameterError if a field is missing in the layer of this name.
     """
     lacking = next((one for one in STATION_NEEDS if one not in fields), None)
     if lacking:
@@ -90,10 +81,7 @@ def with_cant(
 ) -> list[Track]:
     """Return tracks, given by number and vertices, with the cant of their stations.
 
-    Raises
-    ------
-    ParameterError
-        No track has stations; `quality` and `tracks` are the parameters that the message names.
+    Raises ParameterError if no track has stations; `quality` and `tracks` are the parameters that the message names.
     """
     if not any(number in stations for number, _ in lines):
         raise ParameterError(f"{quality} has no stations of the tracks in {tracks}: give their track geometry.")
@@ -103,17 +91,11 @@ def with_cant(
 
 @dataclass(frozen=True)
 class Measured:
-    """Points of a track, or of a part of it: its vertices, those averaged that are closer than a metre.
+    """Points of a track, or of a part of it: its vertices, those averaged that are closer than a metre; `xyz` (n, 3).
 
-    Attributes
-    ----------
-    xyz : (n, 3) array
-    along : (n,) array
-        Plan distance from the first vertex of the track along the line.
-    share : (n,) array
-        Number of vertices in each point that do not bridge a gap.
-    is_stray : (n, 2) bool array
-        Whether a point lies off its neighbours, so that it does not count: in plan, in height.
+    `along`, (n,), is the plan distance from the first vertex of the track, and `share`, (n,), the number of vertices in
+    each point that do not bridge a gap. `is_stray`, (n, 2), says whether a point lies off its neighbours, so that it
+    does not count: in plan, in height.
     """
 
     xyz: np.ndarray

@@ -59,13 +59,7 @@ _ROW = 1 << 32
 
 
 def plausible(sources: Sequence[PointSource], progress: Progress = SILENT) -> list[PointSource]:
-    """Return the classes whose points can be those of rails, and warn the user about the others.
-
-    Raises
-    ------
-    CloudError
-        No class can be rails.
-    """
+    """Return the classes whose points can be those of rails and warn of the others; raise CloudError if none is."""
     reasons = [_why_thin(source) for source in sources]
     if all(reasons):
         raise CloudError(str(reasons[0]))

@@ -54,16 +54,9 @@ SEEN_SHARE = 0.96
 
 @dataclass(frozen=True)
 class Spacings:
-    """Distances between rails, seen from places on them.
+    """Distances between the axes of two rails, (n,), seen from places on them, and the width of the head of each place.
 
-    Attributes
-    ----------
-    distance_m : (n,) array
-        Distances between the axes of two rails.
-    head_width_m : (n,) array
-        Width of the head on which the place is.
-    places : int
-        Number of places, of which some see several rails and some none.
+    Of the places, `places` in number, some see several rails and some none.
     """
 
     distance_m: np.ndarray

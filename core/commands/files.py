@@ -244,12 +244,7 @@ def _chosen(one: kinds.Choice, given: Any) -> Any:
 
 
 def _system(one: kinds.System, given: Any) -> str:
-    """Read a coordinate system.
-
-    Raises
-    ------
-    ParameterError
-    """
+    """Read a coordinate system."""
     try:
         crs = parse_crs(str(given))
     except CrsError:
@@ -262,12 +257,7 @@ def _system(one: kinds.System, given: Any) -> str:
 
 
 def _extent(one: kinds.Extent, given: Any) -> Bounds:
-    """Read a rectangle; the order of its numbers is that of command lines and Python, not that of QGIS.
-
-    Raises
-    ------
-    ParameterError
-    """
+    """Read a rectangle; the order of its numbers is that of command lines and Python, not that of QGIS."""
     try:
         xmin, ymin, xmax, ymax = map(float, given.split(",") if isinstance(given, str) else given)
     except (TypeError, ValueError):
@@ -276,12 +266,7 @@ def _extent(one: kinds.Extent, given: Any) -> Bounds:
 
 
 def _places(one: kinds.Place, given: Any) -> list[tuple[float, float]]:
-    """Read one place or several, as texts or as pairs of numbers.
-
-    Raises
-    ------
-    ParameterError
-    """
+    """Read one place or several, as texts or as pairs of numbers."""
     several = isinstance(given, Sequence) and not isinstance(given, str) and not isinstance(given[0], (int, float))
     found = []
     for place in given if several else [given]:

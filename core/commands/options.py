@@ -15,10 +15,7 @@ from ..progress import Progress
 def vector_module(option: str, name: str = "vectors") -> Any:
     """Return the module that reads vector files, or another one of this package that needs the same packages.
 
-    Raises
-    ------
-    ParameterError
-        The packages are not installed; `option` is what needs them.
+    Raises ParameterError if the packages are not installed; `option` is what needs them.
     """
     try:
         return import_module(f".{name}", __package__)
@@ -32,12 +29,7 @@ class Console(Progress):
     """Prints steps, remaining time and warnings to the error output; Ctrl-C cancels it.
 
     Python drops the exception of a Ctrl-C that comes during a finalizer or some callbacks. The run then ends at its
-    next check for cancellation.
-
-    Parameters
-    ----------
-    word : callable
-        Returns a message with the names of options for those of parameters.
+    next check for cancellation. `word` returns a message with the names of options for those of parameters.
     """
 
     def __init__(self, word: Callable[[str], str] = str) -> None:

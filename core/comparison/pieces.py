@@ -23,17 +23,8 @@ def cut(lines: Sequence[np.ndarray]) -> Chords:
 def spacing_and_cant(left: np.ndarray, right: np.ndarray, rails: Chords) -> np.ndarray:
     """Measure the distance in space of the two rails of a track, and the height of the left one above the right one.
 
-    Parameters
-    ----------
-    left, right : (n, 2) array
-        Where the two rails are expected, metres.
-    rails : Chords
-        Of all rails.
-
-    Returns
-    -------
-    (n, 2) array
-        Metres; NaN where a rail is missing.
+    The rails are expected at `left` and `right`, (n, 2) metres, and found in the chords of all rails. Returns (n, 2)
+    metres; NaN where a rail is missing.
     """
     sides = []
     for place in (left, right):

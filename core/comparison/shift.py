@@ -21,14 +21,8 @@ shows: tracks whose direction varies by less than some six degrees show only the
 class Shift:
     """A constant shift of the later survey, metres.
 
-    Attributes
-    ----------
-    plan_m : (2,) array
-        East and north; for tracks of one direction, the part across them.
-    up_m : float
-        NaN without heights.
-    both : bool
-        Whether the tracks show the shift in both directions of the plan.
+    `plan_m` is east and north; for tracks of one direction, the part across them, so that `both` is false. `up_m` is
+    NaN without heights.
     """
 
     plan_m: np.ndarray
@@ -39,14 +33,8 @@ class Shift:
 def find_shift(across_m: np.ndarray, height_m: np.ndarray, left: np.ndarray) -> Shift:
     """Find the shift that most of the length shares: that with the smallest sum of absolute differences.
 
-    Up to half of the length may have moved without effect on it.
-
-    Parameters
-    ----------
-    across_m, height_m : (n,) array
-        Differences across, positive to the left, and in height; NaN where unknown.
-    left : (n, 2) array
-        Unit vectors to the left.
+    Differences across, positive to the left, and in height are (n,) metres, NaN where unknown; `left`, (n, 2), holds
+    unit vectors to the left. Up to half of the length may have moved without effect on the shift.
     """
     known = np.isfinite(across_m)
     values = np.linalg.svd(left[known], compute_uv=False) if known.any() else np.zeros(2)

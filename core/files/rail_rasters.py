@@ -46,14 +46,8 @@ Block = tuple[int, int, int, int]
 class RasterFile(ABC):
     """A raster that is open for reading; its methods raise an `OSError` where the file is damaged.
 
-    Attributes
-    ----------
-    transform : tuple of float
-        As in GDAL: x, cell width, skew, y, skew, negative cell height.
-    shape : tuple of int
-        Height and width, in cells.
-    bands : tuple of str
-        Description of each band.
+    The transform is that of GDAL: x, cell width, skew, y, skew, negative cell height. The shape is in cells; `bands`
+    has the description of each band.
     """
 
     transform: tuple[float, ...]
@@ -73,13 +67,7 @@ class RasterFile(ABC):
 
 @dataclass(frozen=True)
 class RasterSource:
-    """A file of rail rasters, and what opens it.
-
-    Attributes
-    ----------
-    open : callable
-        Returns a context with the open file; it raises an `OSError` if this is not a raster.
-    """
+    """A file of rail rasters, and what opens it: a context with the open file, or an `OSError` if it is none."""
 
     path: Path
     open: Callable[[Path], AbstractContextManager[RasterFile]]
@@ -88,13 +76,8 @@ class RasterSource:
     def header(self) -> RasterHeader:
         """Everything except the cells, checked.
 
-        Raises
-        ------
-        RasterError
-            The file is not a raster or is rotated, its cells are not square or too small or too large for rails, or the
-            class of a band is unknown.
-        CrsError
-            Its coordinate system is not in units of length.
+        Raises RasterError if the file is not a raster or is rotated, its cells are not square or too small or too large
+        for rails, or the class of a band is unknown; CrsError if its coordinate system is not in units of length.
         """
         with self._opened() as file:
             x, width, skew_x, y, skew_y, height = file.transform
@@ -122,10 +105,7 @@ class RasterSource:
     def read(self, progress: Progress = SILENT) -> tuple[RailRaster, ...]:
         """Read the cells of all bands.
 
-        Raises
-        ------
-        RasterError
-            The file is damaged, has no rail cell, or shows something other than rails.
+        Raises RasterError if the file is damaged, has no rail cell, or shows something other than rails.
         """
         grid = RailRaster({}, self.header.cell_m, 0.0, 0.0)
         shares = progress.split(len(self.header.class_codes))

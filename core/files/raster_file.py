@@ -35,23 +35,14 @@ GAUGE_TAG, HEAD_TAG, MODEL_TAG, EXTENT_TAG = "RAIL_GAUGE_MM", "RAIL_HEAD_MM", "R
 
 @dataclass(frozen=True)
 class RasterHeader:
-    """Everything that a file of rail rasters states except its cells.
+    """Everything that a file of rail rasters states except its cells; a band for each class.
 
-    Attributes
-    ----------
-    class_codes : tuple of int
-        One per band.
-    frame : LocalFrame
-        Its origin is the north-western corner of cell (0, 0) of the rasters.
-    window : tuple of int
-        First row, first column, height and width of the part of the grid that the file covers, in cells.
-    gauge_m, head_width_m : float or None
-        Of the rails for which the raster was made.
-    model : str or None
-        Name of the weights that fit these rails.
-    extent : tuple of float or None
-        Smallest x, smallest y, largest x, largest y of the extent to which the points were restricted, in units of the
-        coordinate system. Lines end there and ignore what is beyond.
+    The origin of the frame is the north-western corner of cell (0, 0) of the rasters. `window` is the first row, first
+    column, height and width of the part of the grid that the file covers, in cells. Gauge and width of the heads are
+    those for which the raster was made; `model` names the weights that fit them.
+
+    `extent` (smallest x and y, largest x and y, in units of the coordinate system) is that to which the points were
+    restricted: lines end there and ignore what is beyond.
     """
 
     class_codes: tuple[int, ...]
@@ -114,10 +105,7 @@ class RasterHeader:
     def standard(self, gauge_mm: float | None, head_width_mm: float | None) -> RailStandard:
         """Return the gauge and the railhead width: those that the user gives, otherwise those of the file.
 
-        Raises
-        ------
-        ParameterError
-            Neither states them, or the number is impossible.
+        Raises ParameterError if neither states them, or the number is impossible.
         """
         gauge_mm = gauge_mm if gauge_mm is not None or self.gauge_m is None else 1000 * self.gauge_m
         head_width_mm = (
@@ -141,12 +129,8 @@ def header_for(
 ) -> RasterHeader:
     """Lay out a file for rasters of one grid, with a margin of a tile in which the network can close gaps.
 
-    One of them, at least, has a rail cell. The frame has its origin in the corner of cell (0, 0).
-
-    Raises
-    ------
-    RasterError
-        The cells are too far apart for a file.
+    One of them, at least, has a rail cell. The frame has its origin in the corner of cell (0, 0). Raises RasterError if
+    the cells are too far apart for a file.
     """
     tiles = np.array([tile for raster in rasters for tile in raster.tiles])
     first, last = tiles.min(axis=0) - 1, tiles.max(axis=0) + 2

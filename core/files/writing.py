@@ -27,20 +27,7 @@ KINDS = {int: np.int32, float: float, str: object}
 
 
 def write_layers(layers: Sequence[AnyLayer], destination: Destination, frame: LocalFrame) -> None:
-    """Write layers into one GeoPackage, whose other layers stay, or one layer into a DXF or CSV file.
-
-    Parameters
-    ----------
-    layers : sequence of Layer or Copy
-        Only the first of them goes into a DXF or CSV file.
-    frame : LocalFrame
-        Local frame of the layers.
-
-    Raises
-    ------
-    DiskError
-        See `Destination.replacing`.
-    """
+    """Write layers of a local frame into one GeoPackage, whose other layers stay, or the first into a DXF or CSV."""
     names = {layer.product.name for layer in layers}
     if destination.file.suffix.lower() != ".gpkg":
         _write_for_others(layers[0], destination, frame)

@@ -17,17 +17,8 @@ _PACKAGES = {"TORCH": ("torch", "torch"), "OPENCV": ("cv2", "opencv-python-headl
 def make_engine(arrays: dict[str, np.ndarray], engine: str = AUTO, device: str = AUTO) -> Engine:
     """Set up the engine that the user chose; with AUTO, PyTorch where it is installed and OpenCV elsewhere.
 
-    Parameters
-    ----------
-    arrays : dict
-        Weights, from `weights.load_arrays`.
-    engine : {"AUTO", "TORCH", "OPENCV"}
-    device : {"AUTO", "CPU", "CUDA"}
-
-    Raises
-    ------
-    ModelError
-        The engine's package or device is not available, or the weights are not those of FRPDF.
+    `engine` is AUTO, TORCH or OPENCV, `device` AUTO, CPU or CUDA. Raises ModelError if the engine's package or device
+    is not available, or the weights are not those of FRPDF.
     """
     if choose_engine(engine, device) == "TORCH":
         try:
@@ -47,10 +38,7 @@ def make_engine(arrays: dict[str, np.ndarray], engine: str = AUTO, device: str =
 def choose_engine(engine: str, device: str) -> str:
     """Return the name of the engine to use, without importing it.
 
-    Raises
-    ------
-    ModelError
-        The engine's package is not installed, or the engine cannot use the device.
+    Raises ModelError if its package is not installed, or it cannot use the device.
     """
     if engine == AUTO:
         engine = "TORCH" if find_spec("torch") else "OPENCV"

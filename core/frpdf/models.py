@@ -18,15 +18,7 @@ MIN_RATIO, MAX_RATIO = 13.4, 26.7
 
 @dataclass(frozen=True)
 class Model:
-    """Trained weights and their rail standard.
-
-    Attributes
-    ----------
-    name : str
-        Option of the parameter MODEL, and value in raster tags.
-    file : str
-        Name of the .npz file in the folder `models`.
-    """
+    """Trained weights and their rail standard; `name` is an option of MODEL, and the value in raster tags."""
 
     name: str
     gauge_m: float
@@ -54,19 +46,9 @@ AUTOMATIC = ("fast",)
 
 
 def choose(gauge_m: float, head_width_m: float, name: str = Parameters.model) -> Model:
-    """Return the model of a name; with AUTO, that whose ratio of gauge to railhead is nearest.
+    """Return the model of a name; with AUTO, that whose ratio of gauge to railhead is nearest (paper, section 7).
 
-    Gribov and Chang, section 7.
-
-    Parameters
-    ----------
-    name : str
-        One of `NAMES`.
-
-    Raises
-    ------
-    ModelError
-        No model was trained for such a ratio.
+    Raises ModelError if no model was trained for such a ratio.
     """
     ratio = gauge_m / head_width_m
     if not MIN_RATIO <= ratio <= MAX_RATIO:

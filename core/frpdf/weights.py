@@ -22,16 +22,9 @@ DTYPES = (np.float16, np.float32)
 
 
 def load_arrays(path: Path) -> dict[str, np.ndarray]:
-    """Read weights; only plain arrays are accepted, and no more memory is used than for weights.
+    """Read weights, float32 arrays by name; no more memory is used than for weights.
 
-    Returns
-    -------
-    dict of str to float32 array
-
-    Raises
-    ------
-    ModelError
-        The file is missing or damaged.
+    Only plain arrays are accepted. Raises ModelError if the file is missing or damaged.
     """
     try:
         with zipfile.ZipFile(path) as archive:
@@ -54,10 +47,7 @@ def _bytes(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> bytes:
 def _array(data: bytes) -> np.ndarray:
     """Read an array from a member of the archive; its header is checked first, because numpy allocates what it states.
 
-    Raises
-    ------
-    ValueError
-        The header states other data than the member holds, or other numbers than weights.
+    Raises ValueError if the header states other data than the member holds, or other numbers than weights.
     """
     file = io.BytesIO(data)
     if np.lib.format.read_magic(file) != (1, 0):

@@ -20,14 +20,7 @@ GRADE_LENGTH_M = 3.0
 
 @dataclass(frozen=True)
 class Ahead:
-    """Where a rail is expected.
-
-    Attributes
-    ----------
-    xy : (2,) array
-    heading : (2,) array
-        Unit vector.
-    """
+    """Where a rail is expected, `xy` (2,), and in which direction, a unit vector."""
 
     xy: np.ndarray
     z: float
@@ -53,17 +46,7 @@ class Ahead:
 
 
 def lead(xyz: np.ndarray, step_m: float, heading: np.ndarray, beam: Beam) -> Ahead:
-    """Continue a course.
-
-    Parameters
-    ----------
-    xyz : (n, 3) array
-        Places on the axis, in order.
-    step_m : float
-        Distance beyond the last one.
-    heading : (2,) array
-        Unit vector, roughly along the course.
-    """
+    """Continue a course by `step_m`, given places on the axis in order, (n, 3), and a unit vector roughly along it."""
     end = xyz[-1]
     step = xyz[:, :2] - end[:2]
     along = step @ heading

@@ -60,17 +60,7 @@ class Reason(Enum):
 
 @dataclass(frozen=True)
 class Window:
-    """What was seen at a place.
-
-    Attributes
-    ----------
-    xyz : (3,) array
-        On the axis of the rail.
-    head : Head or None
-        The rail; None where it was not seen.
-    other_xyz : (3,) array
-        On the axis of the other rail.
-    """
+    """What was seen at a place: the head of the rail and that of the other rail, and the places on their axes, (3,)."""
 
     xyz: np.ndarray
     head: Head | None
@@ -102,18 +92,9 @@ class _Track:
 def follow(
     points: OnHeads, start: Start, behind: np.ndarray, settings: GrowSettings, progress: Progress = SILENT
 ) -> tuple[list[Window], Reason]:
-    """Follow a rail in one direction, from a start that was `turned` to it.
+    """Follow a rail in one direction, from a start that was `turned` to it, to the last window that shows a rail.
 
-    Parameters
-    ----------
-    behind : (n, 3) array
-        Places on the axis up to where it begins, in order.
-
-    Returns
-    -------
-    list of Window
-        In order, up to the last one in which a rail was seen.
-    Reason
+    `behind`, (n, 3), are places on the axis up to where it begins, in order.
     """
     walk = _Walk(points, start, settings)
     parameters = settings.parameters

@@ -26,12 +26,7 @@ of the rail and the distances between its seeds."""
 
 @dataclass(frozen=True)
 class Stop:
-    """Where a rail is not followed further.
-
-    Attributes
-    ----------
-    xyz : (3,) array
-    """
+    """The place, `xyz` (3,), where a rail is not followed further."""
 
     xyz: np.ndarray
     reason: Reason
@@ -39,15 +34,7 @@ class Stop:
 
 @dataclass(frozen=True)
 class Growth:
-    """What grew from a seed.
-
-    Attributes
-    ----------
-    rails : tuple of Rail
-        The rail of the seed and, if it was found and asked for, the other one of its track.
-    stops : tuple of Stop
-        Both ends of the rail of the seed.
-    """
+    """What grew from a seed: its rail, the other one of its track if found and asked for, and both ends of its rail."""
 
     rails: tuple[Rail, ...]
     stops: tuple[Stop, ...]

@@ -27,18 +27,9 @@ CROWN_SHARE = 0.7
 
 @dataclass(frozen=True)
 class Head:
-    """A head in a window.
+    """A head in a window: place of its axis to the left, height of its top, and number of points on it.
 
-    Attributes
-    ----------
-    across_m : float
-        Place of its axis, to the left.
-    top_m : float
-        Height of its top.
-    count : int
-        Points on it.
-    alone : bool
-        Whether no other head touches it.
+    It is `alone` if no other head touches it.
     """
 
     across_m: float
@@ -49,14 +40,9 @@ class Head:
 
 @dataclass(frozen=True)
 class Rail:
-    """A rail that was followed.
+    """A rail that was followed: its axis on the top of the head, (k, 3), and the windows in which it was seen, (k,).
 
-    Attributes
-    ----------
-    xyz : (k, 3) array
-        Its axis on the top of the head, a place for each window from the first one in which it was seen to the last.
-    seen : (k,) bool array
-        Windows in which it was seen.
+    There is a place for each window from the first one in which the rail was seen to the last.
     """
 
     xyz: np.ndarray
@@ -74,10 +60,7 @@ def heads_in(
 ) -> list[Head]:
     """List the heads in a window with as many points or more: one for each group of points, or two that touch.
 
-    Parameters
-    ----------
-    across_m, height_m : (n,) arrays
-        Points on heads: places across and heights.
+    Points on heads are given by places across and heights, (n,) each.
     """
     order = np.argsort(across_m, kind="stable")
     across_m, height_m = across_m[order], height_m[order]
@@ -119,10 +102,7 @@ class _Square:
 class OnHeads:
     """The points on heads by the classification; squares are classified when they are reached, and once.
 
-    Parameters
-    ----------
-    read : callable
-        Returns the points, (n, 3) metres, of the square of the classification in a column and row, with its margin.
+    `read` returns the points, (n, 3) metres, of the square of the classification in a column and row, with its margin.
     """
 
     def __init__(self, read: Callable[[Key], np.ndarray], settings: GrowSettings) -> None:

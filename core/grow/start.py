@@ -40,20 +40,10 @@ TARGET_POINTS, LONGEST_WINDOW_M = 12, 2.0
 
 @dataclass(frozen=True)
 class Start:
-    """A rail found at a seed.
+    """A rail found at a seed: places on its axis, (k, 3), in order, a unit vector along it, and points per metre.
 
-    Attributes
-    ----------
-    xyz : (k, 3) array
-        Places on its axis, in order.
-    heading : (2,) array
-        Unit vector along it.
-    per_m : float
-        Points on the head per metre.
-    side : int
-        1 if the other rail of the track is to the left, -1 to the right, 0 if none was found.
-    level_m : float
-        Height of the other rail above this one.
+    `side` is 1 if the other rail of the track is to the left, -1 to the right, 0 if none was found; `level_m` is the
+    height of the other rail above this one.
     """
 
     xyz: np.ndarray

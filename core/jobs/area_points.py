@@ -24,12 +24,8 @@ Points = TypeVar("Points", RailPoints, "SpooledPoints")
 class Area:
     """The area and the classes of the points to read.
 
-    Attributes
-    ----------
-    what : str
-        What covers the area, for messages: "raster" or "rails".
-    bounds : tuple of float
-        Smallest x, smallest y, largest x, largest y, in units of the coordinate system.
+    `what` covers the area, "raster" or "rails" in messages; `bounds` are smallest x and y, largest x and y, in units of
+    the coordinate system.
     """
 
     what: str
@@ -41,14 +37,8 @@ class Area:
 def read_points_in(area: Area, cloud: CloudSource, progress: Progress) -> dict[int, RailPoints]:
     """Read the points of an area, by class, all in one local frame.
 
-    If the cloud or the area states no coordinate system, that of the other is used.
-
-    Raises
-    ------
-    CrsError
-        Cloud and area have different coordinate systems.
-    NoRailPointsError
-        The cloud has no points of one of the classes in the area.
+    If the cloud or the area states no coordinate system, that of the other is used; if they differ, CrsError is raised.
+    Raises NoRailPointsError if the cloud has no points of one of the classes in the area.
     """
     return _all_of(area, cloud, lambda source, codes, bounds: read_points(source, codes, bounds, progress))
 
@@ -56,15 +46,7 @@ def read_points_in(area: Area, cloud: CloudSource, progress: Progress) -> dict[i
 def spool_points_in(
     area: Area, cloud: CloudSource, side_m: float, folder: Path, progress: Progress
 ) -> dict[int, SpooledPoints]:
-    """Sort the points of an area into squares on disk, so that a cloud of any size fits.
-
-    Parameters
-    ----------
-    side_m : float
-        Side of the squares.
-    folder : Path
-        Where to write them.
-    """
+    """Sort the points of an area into squares of `side_m` on disk, in `folder`, so that a cloud of any size fits."""
     return _all_of(
         area, cloud, lambda source, codes, bounds: spool_points(source, codes, bounds, side_m, folder, progress)
     )

@@ -25,18 +25,10 @@ BoundsIn = Callable[[Optional[str]], Optional[Bounds]]
 
 @dataclass(frozen=True)
 class CloudSource:
-    """The files of a cloud.
+    """The files of a cloud: files, virtual point clouds, or folders of tiles.
 
-    Attributes
-    ----------
-    paths : tuple of Path
-        Files, virtual point clouds, or folders of tiles.
-    crs_wkt : str or None
-        Coordinate system set by the user, used where files state none.
-    mask : Mask or None
-        Area to which the points are limited, in the coordinate system of the cloud.
-    leave_out : tuple of str
-        Flags of points that are left out.
+    `crs_wkt` is set by the user for files that state none. `mask`, in the coordinate system of the cloud, limits the
+    area, and `leave_out` has the flags of points that are left out.
     """
 
     paths: tuple[Path, ...]
@@ -54,10 +46,7 @@ def request_points(
 ) -> Request:
     """Check which points of which files are to be read, and read the headers of the files.
 
-    Parameters
-    ----------
-    unreadable : list of str, optional
-        Gets what is wrong with files that can't be read; without it, one ends the run.
+    `unreadable` gets what is wrong with files that can't be read; without it, one ends the run.
     """
     from ..clouds.points import ask
 
@@ -72,13 +61,7 @@ def read_points(
     bounds: BoundsIn,
     progress: Progress,
 ) -> tuple[RailPoints, ...]:
-    """Read the points on the heads of the rail classes.
-
-    Parameters
-    ----------
-    bounds : callable
-        Returns the extent to read, given the cloud's coordinate system.
-    """
+    """Read the points on the heads of the rail classes; `bounds` returns the extent, given the coordinate system."""
     from ..clouds.on_heads import heads_of
     from ..clouds.points import read_requested
 
@@ -94,15 +77,7 @@ def spool_points(
     folder: Path,
     progress: Progress,
 ) -> tuple[SpooledPoints, ...]:
-    """Sort the points of the rail classes into squares on disk, so that a cloud of any size fits.
-
-    Parameters
-    ----------
-    side_m : float
-        Side of the squares.
-    folder : Path
-        Where to write them.
-    """
+    """Sort the points of the rail classes into squares of `side_m` in `folder`, so that a cloud of any size fits."""
     from ..tiles.spool import spool
 
     return spool(request_points(source, class_codes, bounds, progress), side_m, folder, progress)
@@ -118,12 +93,8 @@ def crs_of(source: CloudSource) -> str | None:
 def checked_crs(source: CloudSource) -> str | None:
     """Return the coordinate system of a cloud's points as WKT, by the header of the first file.
 
-    None where there is none; also where the file is damaged, which the run reports.
-
-    Raises
-    ------
-    CrsError
-        The coordinate system does not measure lengths.
+    None where there is none; also where the file is damaged, which the run reports. Raises CrsError if the coordinate
+    system does not measure lengths.
     """
     from ..clouds.points import ask
     from ..clouds.readers import first_header

@@ -75,16 +75,9 @@ class Feature:
 class Source(ABC):
     """A vector layer or a table.
 
-    Attributes
-    ----------
-    name : str
-        Of the parameter that was given it, for messages.
-    count : int
-        Number of features.
-    kinds : collection of str
-        Kinds of the geometries that it may have; none for a table.
-    notices : sequence of str
-        What the user is told of the fields where the features are copied.
+    `name` is the parameter that was given it, for messages; `count` the number of features; `kinds` those of the
+    geometries that it may have, none for a table. `notices` are what the user is told of the fields where the features
+    are copied.
     """
 
     name: str
@@ -114,10 +107,7 @@ class Source(ABC):
 def read_lines(source: Source, progress: Progress) -> Lines:
     """Read all parts of all lines that have a length, in one local frame.
 
-    Raises
-    ------
-    RailExtractError
-        The lines are in degrees, there is none, or one has an impossible vertex.
+    Raises RailExtractError if the lines are in degrees, there is none, or one has an impossible vertex.
     """
     system = system_of(source.crs_wkt, progress)
     parts = (
@@ -137,10 +127,7 @@ def read_rows(source: Source, progress: Progress) -> Rows:
 def read_lines_along(source: Source, crs_wkt: str | None) -> list[np.ndarray]:
     """Read lines that show places along tracks, (k, 2) each, in a coordinate system.
 
-    Raises
-    ------
-    RailExtractError
-        There is none, one leads to a place that is not on the map, or they can't be transformed.
+    Raises RailExtractError if there is none, one leads to a place that is not on the map, or they can't be transformed.
     """
     lines = [line for _, line in _lines_along(source, _placed(source, crs_wkt), crs_wkt)]
     if not lines:
@@ -182,10 +169,7 @@ def read_seeds(source: Source, crs_wkt: str | None) -> list[np.ndarray]:
 def read_mask(source: Source, crs_wkt: str | None) -> Mask:
     """Read the polygons of a mask, of which overlaps count once.
 
-    Raises
-    ------
-    RailExtractError
-        There is none, one is not on the map, or they can't be transformed.
+    Raises RailExtractError if there is none, one is not on the map, or they can't be transformed.
     """
     _placed(source, crs_wkt)
     rings = source.rings(crs_wkt)
@@ -195,17 +179,10 @@ def read_mask(source: Source, crs_wkt: str | None) -> Mask:
 
 
 def read_axes(values: Values, crs_wkt: str | None) -> PlacedAxes:
-    """Read AXIS and what states its kilometres, in a coordinate system.
+    """Read AXIS and what states its kilometres, in a projected coordinate system, or None for metres as they are.
 
-    Parameters
-    ----------
-    crs_wkt : str or None
-        Projected, or None for coordinates in metres that nothing transforms.
-
-    Raises
-    ------
-    RailExtractError
-        A layer can't be transformed or lacks what it should state, or they contradict each other.
+    Raises RailExtractError if a layer can't be transformed or lacks what it should state, or they contradict each
+    other.
     """
     axis, unit_m = values.source("AXIS"), unit_in_plan(crs_wkt)
     lines = list(_axis_lines(axis, crs_wkt, unit_m))

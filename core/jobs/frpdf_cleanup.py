@@ -42,12 +42,7 @@ def _planned(values: Values) -> tuple[RasterHeader, Model]:
 def model_for(header: RasterHeader, standard: RailStandard, name: str) -> Model:
     """Return the model that the user named, or that a raster names, or that fits its rails; check the cell size.
 
-    Raises
-    ------
-    ModelError
-        No model fits.
-    RasterError
-        The cells do not have the size that the network expects for these rails.
+    Raises ModelError if no model fits, and RasterError if the network expects another cell size for these rails.
     """
     from ..raster import cell_size
 

@@ -36,12 +36,7 @@ MAX_WHOLE, ID = 2**31 - 1, re.compile(r"\s*\d{1,10}\s*")
 class Lines:
     """The parts of all lines of a layer, each a line of its own.
 
-    Attributes
-    ----------
-    parts : list of (int, mapping, (n, 3) array)
-        Feature, its values by the name of the field, and vertices, local metres; z is NaN without heights.
-    fields : collection of str
-        Names of all fields.
+    A part is its feature, the values by field, and the vertices, (n, 3) local metres; z is NaN without heights.
     """
 
     parts: list[tuple[int, Row, np.ndarray]]
@@ -57,21 +52,10 @@ class Lines:
         system: tuple[str | None, float, float],
         progress: Progress,
     ) -> Lines:
-        """Check the lines of a layer, and put them into a local frame.
+        """Check the lines of a layer, and put them into a local frame; `system` is that of `system_of`.
 
-        Parameters
-        ----------
-        name : str
-            Of the layer's parameter, for messages.
-        parts : iterable of (int, mapping, (n, 3) array)
-            With vertices in the coordinate system.
-        system : (str or None, float, float)
-            From `system_of`.
-
-        Raises
-        ------
-        RailExtractError
-            There is no line, or one with an impossible vertex.
+        `name` is that of the layer's parameter, for messages. Raises RailExtractError if there is no line, or one with
+        an impossible vertex.
         """
         crs_wkt, horizontal_unit_m, vertical_unit_m = system
         found = list(parts)
@@ -171,13 +155,7 @@ class Lines:
 
 
 def system_of(crs_wkt: str | None, progress: Progress) -> tuple[str | None, float, float]:
-    """Return a coordinate system with its units in plan and in height, metres.
-
-    Raises
-    ------
-    CrsError
-        It is in degrees.
-    """
+    """Return a coordinate system with its units in plan and in height, metres; raise CrsError if it is in degrees."""
     if not crs_wkt:
         progress.warning("The lines have no coordinate system: their coordinates are taken as metres.")
         return None, 1.0, 1.0

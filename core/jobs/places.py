@@ -21,20 +21,9 @@ FAR, NOWHERE = np.full(2, np.inf), np.full(2, np.nan)
 class Places:
     """Features of a layer in the plane of an axis.
 
-    Attributes
-    ----------
-    ids : sequence of int
-        Of the n features.
-    xy : (n, 2) array
-        Where each counts: half way along a line, inside a polygon, in the mean of points; else `FAR` or `NOWHERE`.
-    vertices : (m, 2) array
-        Of all features; of a polygon, of its outer ring.
-    owner : (m,) int array
-        Number of the feature of each vertex.
-    are_points : bool
-        Whether the layer has nothing but points.
-    originals : Source
-        For a `Copy` with further fields.
+    `xy`, (n, 2), is where each counts: half way along a line, inside a polygon, in the mean of points; else `FAR` or
+    `NOWHERE`. `vertices`, (m, 2), are those of all features, of a polygon those of its outer ring, and `owner`, (m,),
+    the number of the feature of each. `originals` is for a `Copy` with further fields.
     """
 
     ids: Sequence[int]

@@ -16,23 +16,10 @@ from .values import Values
 
 
 def check_same_plane(name: str, crs_wkt: str | None, other_name: str, other: LocalFrame) -> None:
-    """Check that two inputs have the same coordinate system in plan; an unknown one is taken to be the other.
+    """Check that two inputs, of these names, have the same coordinate system in plan.
 
-    Parameters
-    ----------
-    name : str
-        Name of the first input, for the message.
-    crs_wkt : str or None
-        Coordinate system of the first input.
-    other_name : str
-        Name of the second input.
-    other : LocalFrame
-        Frame of the second input.
-
-    Raises
-    ------
-    CrsError
-        Both systems are known and differ, or the second is unknown and the first is not in metres.
+    An unknown one is taken to be the other. Raises CrsError if both are known and differ, or the second is unknown and
+    the first is not in metres.
     """
     if crs_wkt and other.crs_wkt and not same_plane(crs_wkt, other.crs_wkt, tuple(other.origin[:2])):
         raise CrsError(
@@ -60,10 +47,7 @@ def way(name: str, own: LocalFrame, other_name: str, frame: LocalFrame) -> np.nd
 def read_tracks(values: Values, name: str, progress: Progress) -> tuple[list[Track], LocalFrame]:
     """Read centerlines with their cant: from QUALITY, else from RAILS.
 
-    Raises
-    ------
-    RailExtractError
-        A layer has no lines, lacks a field, or states the cant of other tracks.
+    Raises RailExtractError if a layer has no lines, lacks a field, or states the cant of other tracks.
     """
     read = values.lines(name, progress)
     lines, frame = [(line.track_id, line.xyz) for line in read.centerlines()], read.frame
@@ -81,12 +65,8 @@ def read_tracks(values: Values, name: str, progress: Progress) -> tuple[list[Tra
 def read_elements(values: Values, name: str, crs_wkt: str | None, progress: Progress = SILENT) -> list[Alignment]:
     """Read the alignments of an element table; its geometries are not used.
 
-    `crs_wkt` is the coordinate system of a table that has none.
-
-    Raises
-    ------
-    RailExtractError
-        The table is in degrees or not an element table, or an element is wrong.
+    `crs_wkt` is the coordinate system of a table that has none. Raises RailExtractError if the table is in degrees or
+    not an element table, or an element is wrong.
     """
     table, fields = values.rows(name, progress)
     check_table(fields, name)

@@ -31,13 +31,7 @@ def _check(values: Values) -> None:
 
 
 def _plane(values: Values) -> str | None:
-    """Return the coordinate system in which kilometres are measured: that of the axis, else that of the places.
-
-    Raises
-    ------
-    CrsError
-        Those that are known are in degrees.
-    """
+    """Return the coordinate system in which kilometres are measured: that of the axis, else that of the places."""
     from ..clouds.crs import is_geographic, parse_crs
     from ..kilometres.axes import AXIS_IN_DEGREES
 

@@ -240,13 +240,7 @@ class Values(ABC):
         return GrowParameters(**self._stated(GROWTH))
 
     def has_axis(self) -> bool:
-        """Return whether AXIS is filled in.
-
-        Raises
-        ------
-        ParameterError
-            It is not, but what states its kilometres is.
-        """
+        """Return whether AXIS is filled in; raise ParameterError if only what states its kilometres is."""
         lone = next((name for name in ("START_KM", "POSTS", "JUMPS") if self.filled(name)), None)
         if lone and not self.filled("AXIS"):
             raise ParameterError(f"{lone} needs the line that it applies to: choose AXIS.")
@@ -259,13 +253,7 @@ class Values(ABC):
         return choose_engine(self["ENGINE"], self["DEVICE"])
 
     def weights(self) -> Path | None:
-        """Read METHOD and WEIGHTS: the weights of the network that finds rail points, or None for geometry.
-
-        Raises
-        ------
-        ParameterError, ModelError
-            They contradict each other, or can't be used.
-        """
+        """Read METHOD and WEIGHTS: the weights of the network that finds rail points, or None for geometry."""
         from ..learned.model import weights_for
 
         return weights_for(self["METHOD"], self["WEIGHTS"])
@@ -306,13 +294,7 @@ class Values(ABC):
 
 
 def class_numbers(text: str, what: str) -> tuple[int, ...]:
-    """Parse classes such as "10,11"; `what` is the name of the parameter, for the error.
-
-    Raises
-    ------
-    ParameterError
-        The text is not a list of classes, or is empty.
-    """
+    """Parse classes such as "10,11"; `what` is the name of the parameter, for the error."""
     words = [word for word in re.split(r"[;,\s]+", text) if word]
     if not words or not all(map(is_class, words)):
         raise ParameterError(f'{what} "{text}" must be whole numbers from 0 to {LAST_CLASS} such as 10 or 10,11.')

@@ -63,13 +63,7 @@ def _run(values: Values, progress: Progress) -> Result:
 
 
 def moved(raster: RailRaster, frame: LocalFrame, other: LocalFrame) -> RailRaster:
-    """Return a raster in another local frame of the same coordinate system.
-
-    Parameters
-    ----------
-    frame, other : LocalFrame
-        Present frame and new frame.
-    """
+    """Return a raster of one frame in another local frame of the same coordinate system."""
     right, up, _ = frame.shift_to(other)
     return replace(raster, x0=raster.x0 + float(right), y0=raster.y0 + float(up))
 

@@ -29,13 +29,9 @@ SAME_KM = 1e-6
 
 @dataclass(frozen=True)
 class Jump:
-    """A place at which the numbers jump.
+    """A place at which the numbers jump, seen along increasing kilometres, from `back_km` to `ahead_km`.
 
-    Attributes
-    ----------
-    back_km, ahead_km : float
-        Numbers at its end of the section before it and of the section after it, seen along increasing kilometres. With
-        a smaller number ahead, numbers are twice (overlap); with a larger one, numbers are missing (gap).
+    With a smaller number ahead, numbers are twice (overlap); with a larger one, numbers are missing (gap).
     """
 
     back_km: float
@@ -46,16 +42,8 @@ class Jump:
 class Stationing:
     """Kilometres along an axis; (k,) arrays of knots, between which they are linear.
 
-    Attributes
-    ----------
-    s : (k,) array
-        Not decreasing, metres; a jump has two knots at the same place.
-    km : (k,) array
-        Increasing within a piece.
-    piece : (k,) int array
-        Number of the piece between two jumps, from 0.
-    notices : tuple of str
-        Sentences about posts that do not fit.
+    `s`, metres, does not decrease: a jump has two knots at the same place. `km` increases within a piece; `piece` is
+    the number of the piece between two jumps, from 0. `notices` are sentences about posts that do not fit.
     """
 
     s: np.ndarray
@@ -102,23 +90,12 @@ class Stationing:
 
 
 def stationing_of(length_m: float, s: Sequence[float], km: Sequence[float], jumps: Sequence[Jump] = ()) -> Stationing:
-    """Give an axis its kilometres from places of which the kilometre is known.
+    """Give an axis its kilometres from places `s`, metres, not decreasing, of which the kilometre is known.
 
     Between two of them, kilometres are interpolated, and beyond them they continue at true length. Where the axis is
     longer or shorter than the numbers by more than `JUMP_M` and no jump is stated, the numbers count on at true length
-    up to the next place and jump there, as posts are numbered.
-
-    Parameters
-    ----------
-    s : sequence of float
-        Places, metres, not decreasing; at least one.
-    jumps : sequence of Jump
-        In the order of increasing kilometres of the line.
-
-    Raises
-    ------
-    RailExtractError
-        Kilometres decrease without a jump, or a jump is not on the axis.
+    up to the next place and jump there, as posts are numbered. `jumps` are in the order of increasing kilometres of the
+    line. Raises RailExtractError if kilometres decrease without a jump, or a jump is not on the axis.
     """
     knots = _Knots(list(jumps))
     knots.before(s[0], km[0])

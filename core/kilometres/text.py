@@ -19,20 +19,9 @@ WRITTEN = re.compile(r"\s*([+-]?\d+(?:[.,]\d*)?)\s*(?:\+\s*(\d+(?:[.,]\d*)?))?\s
 class Notation:
     """A way to write kilometres: a round number of the line and the length from there.
 
-    Attributes
-    ----------
-    base_km : float
-        Distance between the round numbers.
-    step_m : float
-        Unit of the length from there, metres.
-    decimals : int
-        Of this length.
-    pattern : str
-        Format of the round number in its own unit, and of the length.
-    unit_km : float
-        Unit of the round number.
-    comma : bool
-        Whether the decimal sign is a comma.
+    `base_km` is the distance between the round numbers, `unit_km` the unit of these, `step_m` that of the length from
+    there, metres, and `decimals` are those of this length. `pattern` formats the round number in its own unit and the
+    length; `comma` makes the decimal sign a comma.
     """
 
     base_km: float

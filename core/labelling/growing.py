@@ -65,8 +65,6 @@ def grow_files(
 
     Raises
     ------
-    CloudError, DiskError
-        See `files.classify_files`.
     OffCloudError, OffRailError
         No seed is in the cloud, or on a rail.
     """
@@ -138,10 +136,7 @@ def grow_all(
 class Cloud:
     """Points within reach of seeds, sorted into the squares of the classification on disk.
 
-    Parameters
-    ----------
-    places : (k, 2) array
-        Seeds, metres from the zero of the coordinate system.
+    `places`, (k, 2), are the seeds, metres from the zero of the coordinate system.
     """
 
     def __init__(

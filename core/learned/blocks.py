@@ -80,16 +80,11 @@ class Thinned:
 
 @dataclass(frozen=True)
 class Block:
-    """Points that go through the network together.
+    """Points that go through the network together, with the column and row of the block in the square.
 
-    Attributes
-    ----------
-    number : (n,) int array
-        Numbers among the thinned points, in the order in which layers drop them, the last ones first.
-    core : (n,) bool array
-        Points in the middle of the block that can be on rails; those of all blocks of a square cover it once.
-    key : tuple of int
-        Column and row in the square.
+    `number`, (n,), are their numbers among the thinned points, in the order in which layers drop them, the last ones
+    first. `core`, (n,), are the points in the middle of the block that can be on rails; those of all blocks of a square
+    cover it once.
     """
 
     number: np.ndarray
@@ -98,13 +93,7 @@ class Block:
 
 
 def thin(xyz: np.ndarray) -> Thinned:
-    """Find the heights above the bed and thin the points.
-
-    Parameters
-    ----------
-    xyz : (n, 3) array
-        See `classify.square.classify_square`.
-    """
+    """Find the heights above the bed and thin the points, (n, 3) as in `classify.square.classify_square`."""
     bed, height, z = Bed.under(xyz)
     used = np.flatnonzero((height >= LEAST_M) & (height <= HIGH_M))
     place = np.column_stack([xyz[used, :2], z[used], height[used]]).astype(np.float32)
@@ -132,13 +121,7 @@ def _one_of_each(place: np.ndarray, side_m: float) -> tuple[np.ndarray, np.ndarr
 
 
 def cut(thinned: Thinned, side_m: float) -> list[Block]:
-    """Cut a square into blocks; places without a point in the zone of railheads are left out.
-
-    Parameters
-    ----------
-    side_m : float
-        Side of the square.
-    """
+    """Cut a square of `side_m` into blocks; places without a point in the zone of railheads are left out."""
     core_m = core_side(side_m)
     margin_m = min((BLOCK_M - core_m) / 2, core_m / 2 - 1e-6)
     inside = np.all((thinned.place[:, :2] >= 0) & (thinned.place[:, :2] < side_m), axis=1)

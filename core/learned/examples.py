@@ -37,18 +37,9 @@ CHECKS = "checks.json"
 
 @dataclass(frozen=True)
 class Plan:
-    """What a training is given, besides the cloud.
+    """What a training is given, besides the cloud: classes of the rail points, and the device, AUTO, CPU or CUDA.
 
-    Attributes
-    ----------
-    rail_classes : tuple of int
-        Classes of the rail points.
-    epochs : int
-        How many times each block with rails is learned from.
-    seed : int
-    device : {"AUTO", "CPU", "CUDA"}
-    start : Path, optional
-        Weights to start from.
+    Each block with rails is learned from in every epoch; `start` has weights to start from.
     """
 
     rail_classes: tuple[int, ...]
@@ -60,25 +51,14 @@ class Plan:
 
 @dataclass(frozen=True)
 class Examples:
-    """Labelled blocks.
-
-    Attributes
-    ----------
-    index : (n,) array of ENTRY
-    """
+    """Labelled blocks in a folder, and their index, an (n,) array of ENTRY."""
 
     folder: Path
     index: np.ndarray
 
     @classmethod
     def load(cls, folder: Path) -> Examples:
-        """Read the index of blocks that `save_index` has completed.
-
-        Raises
-        ------
-        ValueError
-            A file is missing or damaged.
-        """
+        """Read the index of blocks that `save_index` has completed; ValueError if a file is missing or damaged."""
         if (folder / CHECKS).read_bytes() != _checks(folder):
             raise ValueError(f"{folder} is damaged")
         return cls(folder, np.load(folder / INDEX))
@@ -90,13 +70,7 @@ class Examples:
         return np.array(points[entry["start"] : entry["start"] + entry["count"]])
 
     def validation(self, seed: int) -> np.ndarray:
-        """Choose the blocks that are kept back, (n,) bool.
-
-        Raises
-        ------
-        ParameterError
-            There are no two areas with rails.
-        """
+        """Choose the blocks that are kept back, (n,) bool; raise ParameterError if no two areas have rails."""
         areas, area = np.unique(self.index["area"], axis=0, return_inverse=True)
         has_rail = np.bincount(area.ravel(), self.index["rail"]) > 0
         if has_rail.sum() < 2:
@@ -115,24 +89,10 @@ class Examples:
 def write_square(
     folder: Path, file: int, key: tuple[int, int], side_m: float, xyz: np.ndarray, rail: np.ndarray, tile: np.ndarray
 ) -> np.ndarray:
-    """Write the blocks of a square.
+    """Write the blocks of a square, given the number of its file, and its column and row; return (k,) of ENTRY.
 
-    Parameters
-    ----------
-    file : int
-        Number of the square's file.
-    key : tuple of int
-        Column and row of the square.
-    xyz : (n, 3) array
-        See `classify.square.classify_square`.
-    rail : (n,) bool array
-        Labels.
-    tile : (n,) int array
-        Number of the tile of the cloud.
-
-    Returns
-    -------
-    (k,) array of ENTRY
+    Points are (n, 3) as in `classify.square.classify_square`, with their label and the number of their tile of the
+    cloud, (n,) each.
     """
     thinned = thin(xyz)
     labels, count = rail[thinned.band], len(thinned.number)

@@ -92,15 +92,7 @@ def _verdict(survey: Survey) -> tuple[str, str]:
 
 
 def airborne_page(survey: Survey, source: str, facts: Mapping[str, str]) -> str:
-    """Return the report as a complete HTML document.
-
-    Parameters
-    ----------
-    source : str
-        Name of the cloud.
-    facts : mapping of str to str
-        Further facts to state, by name.
-    """
+    """Return the report as a complete HTML document, with the name of the cloud and further facts by name."""
     kind, words = _verdict(survey)
     return page(
         f"Rail Extract: {source}",

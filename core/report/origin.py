@@ -22,18 +22,10 @@ INTERFACE = {"passes": "iterations", "quality_step": "step"}
 
 @dataclass(frozen=True)
 class Origin:
-    """From what and how a result was computed.
+    """From what and how a result was computed; `command` repeats the run.
 
-    Attributes
-    ----------
-    paths : tuple of Path
-        Files or folders of the cloud.
-    command : str
-        Repeats the run.
-    parameters : Parameters or None
-        None if the lines come from another run.
-    time : datetime
-        Of the report, in the time zone of this computer.
+    The parameters are None if the lines come from another run. The time is that of the report, in the time zone of this
+    computer.
     """
 
     paths: tuple[Path, ...]

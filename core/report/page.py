@@ -47,23 +47,10 @@ STRIP_NOTE = (
 def build_page(
     network: RailNetwork, gauges_m: Sequence[float], source: str, facts: Mapping[str, str] | None = None
 ) -> str:
-    """Return the report on a network.
+    """Return the report on a network with the geometry of its tracks, a complete HTML document.
 
-    Parameters
-    ----------
-    network : RailNetwork
-        With the geometry of its tracks.
-    gauges_m : sequence of float
-        Gauges that tracks may have.
-    source : str
-        Name of the cloud.
-    facts : mapping of str to str
-        Further facts to state, such as parameters, by name.
-
-    Returns
-    -------
-    str
-        A complete HTML document.
+    Tracks may have the gauges `gauges_m`; `source` names the cloud, and `facts`, such as parameters, are stated by
+    name.
     """
     findings = examine(network, gauges_m)
     return page(

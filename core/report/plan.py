@@ -22,15 +22,9 @@ LABEL_PLACES = 6
 
 @dataclass(frozen=True)
 class Course:
-    """A track in the map.
+    """A track in the map: its stations, `xyz` (n, 3), and which of them have a mark, by the mark's CSS class.
 
-    Attributes
-    ----------
-    label : str
-    xyz : (n, 3) array
-        Its stations.
-    marks : mapping of str to (n,) bool array
-        Which stations have a mark, by the CSS class of the mark; later ones are drawn over earlier ones.
+    Later marks are drawn over earlier ones.
     """
 
     label: str

@@ -45,17 +45,7 @@ class Shade:
 
 @dataclass(frozen=True)
 class Frame:
-    """The axes of a panel in a picture.
-
-    Attributes
-    ----------
-    top : float
-        Upper side.
-    along : tuple of float
-        First and last place along the track.
-    limits : tuple of float
-        Lower and upper end of the panel.
-    """
+    """The axes of a panel in a picture: its upper side, the first and last place along the track, and the limits."""
 
     top: float
     along: tuple[float, float]
@@ -83,18 +73,10 @@ class Frame:
 
 @dataclass(frozen=True)
 class Panel:
-    """A quantity along the track.
+    """A quantity along the track, with its unit as it is written beside the heading.
 
-    Attributes
-    ----------
-    heading, unit : str
-        The unit as it is written beside the heading.
-    min_span : float
-        Smallest range of the panel, so that noise does not look alarming.
-    band : tuple of float or None
-        Lower and upper limit of the values that are in order.
-    floor, ceiling : float or None
-        Ends of the panel, if fixed.
+    `min_span` is the smallest range of the panel, so that noise does not look alarming; `band` has the limits of values
+    that are in order. Floor and ceiling fix the ends of the panel.
     """
 
     heading: str

@@ -38,10 +38,7 @@ STEP_M = 1.5
 def draw_profiles(track: TrackFindings, height_m: np.ndarray) -> str:
     """Return the profiles of height, gauge, cant, twist, curvature and standard error of a track as SVG.
 
-    Parameters
-    ----------
-    height_m : (n,) array
-        Heights of the stations above the cloud's datum.
+    `height_m`, (n,), are the heights of the stations above the cloud's datum.
     """
     geometry, gauge = track.geometry, track.nominal_mm
     along = float(geometry.chainage_m[0]), float(geometry.chainage_m[-1])
@@ -84,13 +81,7 @@ def _kilometres(track: TrackFindings, along: tuple[float, float], y: float) -> l
 
 
 def draw_strips(courses: Sequence[StripCourse]) -> str:
-    """Return profiles of the offsets of the strips of one track as SVG, with their legend.
-
-    Parameters
-    ----------
-    courses : sequence of StripCourse
-        All of the same track.
-    """
+    """Return profiles of the offsets of the strips of one track as SVG, with their legend."""
     every = np.concatenate([course.chainage_m for course in courses])
     along = float(every.min()), float(max(every.max(), every.min() + 1.0))
     colours = [COLOURS[number % len(COLOURS)] for number in range(len(courses))]

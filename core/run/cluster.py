@@ -79,10 +79,7 @@ def _deaf_to_interrupts() -> Iterator[None]:
 def running(scheduler: str, certificates: Certificates | None = None) -> Iterator[Client]:
     """Use a running scheduler that has workers, given its address, such as tls://10.0.0.1:8786.
 
-    Raises
-    ------
-    RailExtractError
-        There is no scheduler at this address, or the certificates can't be used.
+    Raises RailExtractError if there is no scheduler at this address, or the certificates can't be used.
     """
     security = None if certificates is None else certificates.security()
     try:

@@ -60,7 +60,6 @@ class Task:
         What the task does, for error messages.
     function : callable
         Called with the arguments followed by a `Context`. A function of a module, so that other processes find it.
-    arguments : tuple
     needs : tuple of Name
         Tasks without whose results this one cannot run.
     uses : tuple of Name

@@ -129,12 +129,7 @@ def can_store(result: Any) -> bool:
 
 
 def save(path: Path, result: RailRaster | SquareRails | tuple[RailLine, ...]) -> None:
-    """Write a result, in a temporary folder first: a full disk or a killed worker leaves no incomplete file.
-
-    Raises
-    ------
-    DiskError
-    """
+    """Write a result, in a temporary folder first: a full disk or a killed worker leaves no incomplete file."""
     arrays: list[bytes] = []
     text = json.dumps(_described(result, arrays), default=np.generic.item)
     with writing(path.parent), scratch_folder(path.parent) as scratch:
@@ -151,12 +146,7 @@ class DamagedError(RailExtractError):
 
 
 def load(stored: Stored) -> Any:
-    """Read what `save` wrote.
-
-    Raises
-    ------
-    DamagedError
-    """
+    """Read what `save` wrote; raise DamagedError if it was changed."""
     try:
         with np.load(stored.path, allow_pickle=False) as file:
             return _restored(json.loads(file["text"].tobytes()), BytesIO(file["arrays"].tobytes()))

@@ -37,18 +37,11 @@ PieceEnd = tuple[int, int]
 
 @dataclass(frozen=True)
 class SquareRails:
-    """The result of one square.
+    """The result of one square: rails in its local metres, cut `HALO_M` outside its border.
 
-    Attributes
-    ----------
-    rails : tuple of RailLine
-        In local metres of the square, cut `HALO_M` outside its border; rails without any length inside are left out.
-    nodes : (n, 2) array
-        Places where rails end on each other.
-    strips : (k, 7) array
-        Offsets of strips at places inside, see `strips.rows_of`.
-    blunt : bool or None
-        Whether the square shows blunt heads; None without lines.
+    Rails without any length inside are left out. `nodes`, (n, 2), are places where rails end on each other, `strips`,
+    (k, 7), offsets of strips at places inside as in `strips.rows_of`, and `blunt` says whether the square shows blunt
+    heads; None without lines.
     """
 
     square: Square
@@ -88,16 +81,10 @@ def rows_in_frame(part: SquareRails, frame: LocalFrame) -> np.ndarray:
 
 @dataclass
 class Piece:
-    """The part of a square's rail that no earlier square shows.
+    """The part of a square's rail that no earlier square shows, in the common frame, between two chainages of the rail.
 
-    Attributes
-    ----------
-    rail : RailLine
-        In the common frame.
-    start, end : float
-        Chainages along the rail.
-    links : dict of int to PieceEnd
-        For each end, 0 or 1, the end of another piece that continues this one; ends that nothing continues are missing.
+    `links` has, for each end, 0 or 1, the end of another piece that continues this one; ends that nothing continues are
+    missing.
     """
 
     rail: RailLine

@@ -35,16 +35,11 @@ LAYOUT = 2
 
 @dataclass(frozen=True)
 class SpooledFile:
-    """The sorted points of one file of the cloud.
+    """The sorted points of one file of the cloud, in a folder, and a report on them.
 
-    Attributes
-    ----------
-    folder : str
-        Folder that holds the points.
-    report : dict
-        "classes": for each class code, the number of points by square, the checksum of each square's file, and the
-        smallest and largest x and y in units of the CRS. "census": number of all points by class. "steps": for each
-        axis, the number of points of the requested classes by `origin_steps`.
+    "classes" has, for each class code, the number of points by square, the checksum of each square's file, and the
+    smallest and largest x and y in units of the CRS. "census" has the number of all points by class, "steps", for each
+    axis, the number of points of the requested classes by `origin_steps`.
     """
 
     folder: str
@@ -53,18 +48,10 @@ class SpooledFile:
 
 @dataclass(frozen=True)
 class SpooledPoints:
-    """The points of one class on disk, a `PointSource`.
+    """The points of one class on disk, a `PointSource`; `found` and `blunt` as in `RailPoints`.
 
-    Attributes
-    ----------
-    frame, class_code, side_m, counts, span_m
-        See `PointSource`.
-    files : mapping of Key to tuple of str
-        Files that hold the points of each square, one for each mark (see `passes.marks_of`), with which its name ends.
-    passes : mapping of int to int
-        Number of the strip, a pass of the scanner, of each mark.
-    found, blunt
-        See `RailPoints`.
+    `files` hold the points of each square, one for each mark (see `passes.marks_of`), with which its name ends;
+    `passes` has the number of the strip, a pass of the scanner, of each mark.
     """
 
     frame: LocalFrame
@@ -115,14 +102,8 @@ def _read(file: str, square: Square, margin_m: float) -> np.ndarray:
 def spool(request: Request, side_m: float, folder: Path, progress: Progress = SILENT) -> tuple[SpooledPoints, ...]:
     """Read a cloud once and sort its points into squares in a folder that the caller removes.
 
-    Returns one for each requested class that has points, in ascending order of code, all in one local frame.
-
-    Raises
-    ------
-    CloudError, DiskError
-        A file is damaged, or the disk is full.
-    NoRailPointsError
-        No point of the requested classes is within the extent.
+    Returns one for each requested class that has points, in ascending order of code, all in one local frame. Raises
+    CloudError if a file is damaged, and NoRailPointsError if no point of the requested classes is within the extent.
     """
     shares = request.shares(progress)
     found = [spool_file(request, header, side_m, folder, share) for header, share in zip(request.headers, shares)]

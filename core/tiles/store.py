@@ -19,14 +19,9 @@ from .grid import Key
 
 @dataclass(frozen=True)
 class SortedFile:
-    """The points of one file of a cloud, sorted into squares.
+    """The points of one file of a cloud, sorted into a folder with one file per square, and their number by square.
 
-    Attributes
-    ----------
-    folder : str
-        Folder with one file for each square that has points, or points in its margin.
-    counts : mapping of Key to int
-        Points by square.
+    Squares with points in their margin only have a file, too.
     """
 
     folder: str

@@ -40,13 +40,9 @@ early."""
 def tracks_of(rails: Sequence[RailLine], parameters: Parameters, progress: Progress = SILENT) -> list[Centerline]:
     """Pair the rails of each class at every gauge, and draw, simplify and number the centerlines.
 
-    Takes the rails as the user gets them, so that rails from a file give the same tracks.
-
-    Raises
-    ------
-    NoTrackError
-        Rails run parallel, but in no class at one of the gauges. If that is true of some classes only, the user is
-        warned instead.
+    Takes the rails as the user gets them, so that rails from a file give the same tracks. Raises NoTrackError if rails
+    run parallel, but in no class at one of the gauges; if that is true of some classes only, the user is warned
+    instead.
     """
     codes = sorted({rail.class_code for rail in rails})
     centerlines: list[Centerline] = []
@@ -90,26 +86,11 @@ def build_centerlines(
     other_spacings_m: Sequence[float] = (),
     progress: Progress = SILENT,
 ) -> tuple[Centerline, ...]:
-    """Draw the centerlines of all tracks of one gauge, that of the parameters.
+    """Draw the centerlines of all tracks of one gauge, numbered from 1 in order of their starts from west to east.
 
-    Parameters
-    ----------
-    rails : sequence of RailLine
-        The result refers to them by their ids. Rails without heights give centerlines without heights.
-    parameters : Parameters
-    other_spacings_m : sequence of float
-        Distances of the rails of other gauges for which centerlines are made: rails closer to one are left to it.
-    progress : Progress
-
-    Returns
-    -------
-    tuple of Centerline
-        In order of their starts from west to east, numbered from 1; none if no rails are parallel.
-
-    Raises
-    ------
-    NoTrackError
-        Rails are parallel, but at another spacing.
+    The result refers to the rails by their ids; rails without heights give centerlines without heights. Rails closer to
+    `other_spacings_m`, the distances of the rails of other gauges, are left to these. Raises NoTrackError if rails are
+    parallel, but at another spacing.
     """
     rails = _in_order(rails)
     pairs = pair_rails(rails, parameters, other_spacings_m, progress.span(0.0, 0.5))

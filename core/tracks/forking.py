@@ -60,16 +60,7 @@ VERTEX_STEP_M = 0.2
 def fork_centerlines(lines: Sequence[Centerline], progress: Progress = SILENT) -> list[Centerline]:
     """Extend branches back to the tracks that they leave, and give these tracks a vertex there.
 
-    Parameters
-    ----------
-    lines : sequence of Centerline
-        Of one gauge and class.
-    progress : Progress
-
-    Returns
-    -------
-    list of Centerline
-        In the same order; the extension counts as bridged.
+    Takes lines of one gauge and class and returns them in the same order; the extension counts as bridged.
     """
     forked = list(lines)
     for branch, end, through in progress.follow(list(_near_ends(lines))):
