@@ -23,15 +23,7 @@ GROUND = 2
 
 
 def las_of(cloud: AirborneCloud, class_code: int = GROUND, frame: LocalFrame = FRAME) -> laspy.LasData:
-    """Return a cloud as LAS 1.4, with a source id for each strip.
-
-    Parameters
-    ----------
-    class_code : int
-        Of all points.
-    frame : LocalFrame
-        Where the zero of the cloud lies, with the coordinate system.
-    """
+    """Return a cloud as LAS 1.4, with a source id for each strip; the zero of the cloud is that of the frame."""
     where = {"crs": str(frame.crs_wkt), "offsets": frame.origin}
     return las_data(frame.to_crs(cloud.xyz), **where, classification=class_code, point_source_id=cloud.strip + 1)
 

@@ -31,13 +31,8 @@ def straight(rng: np.random.Generator) -> Curve:
 def bend(rng: np.random.Generator, radius_m: float, turns: tuple[int, ...]) -> Curve:
     """Draw arcs of similar radius with transitions between them and straights at both ends.
 
-    Parameters
-    ----------
-    radius_m : float
-        Smallest radius.
-    turns : tuple of int
-        1 for an arc to the left, -1 for one to the right: (1, -1) is a reverse curve. Some arcs have no transition, as
-        in turnouts and yards.
+    `radius_m` is the smallest radius. Turns are 1 for an arc to the left and -1 for one to the right: (1, -1) is a
+    reverse curve. Some arcs have no transition, as in turnouts and yards.
     """
     elements, curvature = [Element(HALF_LENGTH_M)], 0.0
     for turn in (*turns, 0):

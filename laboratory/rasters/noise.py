@@ -61,12 +61,7 @@ def lone_lines(rng: np.random.Generator, window: Window, severity: float) -> lis
 
 
 def shadows(rng: np.random.Generator, window: Window, severity: float) -> np.ndarray:
-    """Draw wedges that are hidden from the scanner by masts, cabinets and trains.
-
-    Returns
-    -------
-    (size, size) bool array
-    """
+    """Draw wedges, (size, size), that are hidden from the scanner by masts, cabinets and trains."""
     hidden = np.zeros((window.size, window.size), dtype=bool)
     centres = (np.arange(window.size) + 0.5) * window.cell_m
     for _ in range(rng.poisson(SHADOWS * severity * _area(window))):
@@ -85,18 +80,7 @@ def shadows(rng: np.random.Generator, window: Window, severity: float) -> np.nda
 def flip(
     rng: np.random.Generator, observed: np.ndarray, label: np.ndarray, severity: float, cell_m: float
 ) -> np.ndarray:
-    """Clear random cells and set others; near the rails more cells are set, because ballast is classified as rail.
-
-    Parameters
-    ----------
-    observed, label : (size, size) bool arrays
-    cell_m : float
-        Side of a cell.
-
-    Returns
-    -------
-    (size, size) bool array
-    """
+    """Clear random cells and set others; near the rails more cells are set, because ballast is classified as rail."""
     lost = rng.random() * LOST_SHARE * severity
     stray = rng.random() ** 3 * STRAY_SHARE * severity
     beside = rng.random() ** 2 * BALLAST_SHARE * severity * (1 + WORST_BALLAST * worst_share(severity))
@@ -109,16 +93,7 @@ def flip(
 
 
 def scatter_patches(rng: np.random.Generator, observed: np.ndarray, severity: float) -> np.ndarray:
-    """Scatter elliptic patches: most set cells, as vegetation classified as rail does; some clear cells.
-
-    Parameters
-    ----------
-    observed : (size, size) bool array
-
-    Returns
-    -------
-    (size, size) bool array
-    """
+    """Scatter elliptic patches: most set cells, as vegetation classified as rail does; some clear cells."""
     size = len(observed)
     result = observed.copy()
     most = PATCHES * severity * (1 + WORST_PATCHES * worst_share(severity)) * (size / 1024) ** 2

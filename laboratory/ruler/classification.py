@@ -68,20 +68,9 @@ def settings_of(scene: RawScene, weights: Path | None = None) -> Settings:
 
 
 def score(scene: RawScene, wide: bool = False, weights: Path | None = None) -> tuple[Score, np.ndarray]:
-    """Classify a scene and compare the labels with the truth.
+    """Classify a scene, by geometry or by trained weights, and compare the labels, (n,), with the truth.
 
-    Parameters
-    ----------
-    wide : bool
-        Whether the beam is as wide as a head.
-    weights : Path, optional
-        Weights of a trained network; None means geometry.
-
-    Returns
-    -------
-    Score
-    (n,) bool array
-        The labels.
+    With `wide`, the beam is as wide as a head.
     """
     start = time.process_time()
     found = classify_cloud(scene.xyz, settings_of(scene, weights))

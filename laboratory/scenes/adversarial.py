@@ -43,18 +43,9 @@ def strip(
     points_per_m: float,
     noise_m: float = 0.004,
 ) -> np.ndarray:
-    """Draw points of a strip along a track.
+    """Draw points, (n, 3), of a strip along a track, whose middle is `left_m` beside and `up_m` above the track's axis.
 
-    Parameters
-    ----------
-    left_m, up_m : float or (n,) array
-        Distance of the middle of the strip to the left of the track's axis, and height above it, at the samples.
-    noise_m : float
-        Standard deviation in each of x, y and z.
-
-    Returns
-    -------
-    (n, 3) array
+    `noise_m` is the standard deviation in each of x, y and z.
     """
     curve, axis = track.curve, track.centerline
     at = rng.randint(len(curve.xy), size=int(points_per_m * curve.length_m))
@@ -97,15 +88,7 @@ def rack(rng: np.random.RandomState, track: Track) -> np.ndarray:
 
 
 def beside(name: str, seed: int, extras: Sequence[Extra], length_m: float = 60.0, radius_m: float = 900.0) -> Scene:
-    """Build a curve next to which other things are classified as rail.
-
-    Parameters
-    ----------
-    extras : sequence of callable
-        Draw the points of these things.
-    length_m, radius_m : float
-        Length and radius of the curve.
-    """
+    """Build a curve next to which other things, drawn by `extras`, are classified as rail."""
     rng = np.random.RandomState(seed)
     curve = trace([Element(length_m, 1 / radius_m, 1 / radius_m)], heading=0.3 + seed)
     track = Track(curve, spacing(STANDARD), rolling(curve), canted(curve, 0.06))
@@ -182,14 +165,8 @@ def from_the_side(
 ) -> Scene:
     """Build a track that is scanned from the next one only, with the side faces of its rails in the class.
 
-    Parameters
-    ----------
-    angle_deg : float
-        Angle of the scanner above the horizontal, seen from the track.
-    face_share : float
-        Share of the points on side faces that are classified as rail.
-    top_share : float
-        The same for the crown.
+    The angle is that of the scanner above the horizontal; the shares are those of points on side faces and on the crown
+    that are classified as rail.
     """
     rng = np.random.RandomState(seed)
     curve = trace([Element(length_m, 1 / 800, 1 / 800)], heading=0.2 * seed)
@@ -223,10 +200,7 @@ def crossing(
 ) -> Scene:
     """Build a road crossing where dirt in the flangeways is classified as rail, and the heads are not.
 
-    Parameters
-    ----------
-    inside_m, depth_m : float
-        Position of the dirt: from the axes of the rails towards the middle of the track, and below their tops.
+    The dirt is `inside_m` from the axes of the rails towards the middle of the track, and `depth_m` below their tops.
     """
     rng = np.random.RandomState(seed)
     curve = trace([Element(70.0, 1 / 1500, 1 / 1500)], heading=0.3 * seed)
@@ -250,12 +224,7 @@ def standing_train(
 ) -> Scene:
     """Build a track on which a train stands, whose wheels, bogies and frames are classified as rail.
 
-    Parameters
-    ----------
-    head_share : float
-        Share of the points on the heads below the train that the scanner sees, in places half a metre long.
-    length_m : float
-        Length of the train.
+    The scanner sees `head_share` of the points on the heads below the train, in places half a metre long.
     """
     rng = np.random.RandomState(seed)
     curve = trace([Element(110.0, 1 / 2000, 1 / 2000)], heading=0.25 * seed)
@@ -278,13 +247,7 @@ def standing_train(
 
 
 def grooved(seed: int = 42, road_m: float = 0.07, noise_m: float = 0.004) -> Scene:
-    """Build grooved rails with a strip of the road on their outer sides in the class.
-
-    Parameters
-    ----------
-    road_m : float
-        Width of the road that is classified as rail.
-    """
+    """Build grooved rails with a strip of the road, `road_m` wide, on their outer sides in the class."""
     rng = np.random.RandomState(seed)
     standard = replace(STANDARD, head_width_m=0.056)
     curve = trace([Element(60.0, 1 / 400, 1 / 400)], heading=0.2 * seed)

@@ -27,20 +27,10 @@ def las_data(
     version: str = "",
     **dimensions: np.ndarray | int,
 ) -> laspy.LasData:
-    """Return points as LAS.
+    """Return points, (n, 3), as LAS, with other values by the name of their dimension: (n,) each, or one for all.
 
-    Parameters
-    ----------
-    xyz : np.ndarray
-        (n, 3), in the coordinate system of the file.
-    crs : str, optional
-        Coordinate system, as WKT or code.
-    offsets : np.ndarray, optional
-        Of the coordinates, (3,); without it, the whole numbers below the first point.
-    version : str
-        Without it, 1.4 where the point format asks for it, else 1.2.
-    **dimensions
-        Other values of the points, (n,) or one for all.
+    The coordinate system is WKT or a code. Without offsets, they are the whole numbers below the first point; without a
+    version, it is 1.4 where the point format asks for it, else 1.2.
     """
     header = laspy.LasHeader(version=version or ("1.4" if point_format > 5 else "1.2"), point_format=point_format)
     header.scales = np.broadcast_to(scales, 3).astype(float)

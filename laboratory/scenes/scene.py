@@ -71,16 +71,8 @@ class Scene:
 class Clutter:
     """Number of points in a scene that are not on rails.
 
-    Attributes
-    ----------
-    weeds_near, weeds_between : int
-        Weeds classified as rail within 0.3 m of rails and within 2 m of tracks.
-    stones : int
-        Points of ballast and rail feet classified as rail.
-    other_weeds : int
-        Weeds that are not classified as rail.
-    ground_step_m : float or None
-        Step of the grid of ground points; None leaves the ground out.
+    Weeds within 0.3 m of rails and within 2 m of tracks, and stones of ballast and rail feet, are classified as rail;
+    other weeds are not. Without a step of their grid, there are no ground points.
     """
 
     weeds_near: int = 0
@@ -120,12 +112,7 @@ class Plan:
 
 
 def build(name: str, plan: Plan, rng: np.random.RandomState) -> Scene:
-    """Scan the rails of a plan, with the guard rails at its frogs, and add its clutter.
-
-    Returns
-    -------
-    Scene
-    """
+    """Scan the rails of a plan, with the guard rails at its frogs, and add its clutter."""
     rails = tuple(rail for track in plan.tracks for rail in track.rails())
     centerlines = tuple(track.thinned(track.centerline) for track in plan.tracks)
     clouds = [(RAIL, points) for points in _scanned(plan, rng)] + _clutter(plan.clutter, rails, centerlines, rng)

@@ -99,12 +99,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> None:
     """Write the chosen scenes, each as a cloud and a file of true lines.
 
-    Raises
-    ------
-    ParameterError
-        A scene is unknown, or a name is given for several scenes.
-    CloudError
-        The folder cannot be written to.
+    Raises ParameterError where a scene is unknown or a name is given for several scenes, CloudError where the folder
+    cannot be written to.
     """
     names: Sequence[str] = args.scenes or tuple(SCENES)
     unknown = [name for name in names if name not in SCENES]

@@ -63,18 +63,10 @@ LEAST_M = 6.0
 
 @dataclass(frozen=True)
 class Surroundings:
-    """What the tracks lie in.
+    """What the tracks lie in: everything that a scanner may see, rails included, and the names of what was built.
 
-    Attributes
-    ----------
-    whole : Thing
-        Everything that a scanner may see, rails included.
-    names : tuple of str
-        What was built.
-    rise : callable
-        Height of the ground above the tops of the rails, metres, by the place to the left of the reference line.
-    paved_m : tuple of float or None
-        Section along the reference line, metres, in which rails are in a pavement.
+    `rise` is the height of the ground above the tops of the rails, by the place to the left of the reference line;
+    `paved_m`, the section along it in which rails are in a pavement, if there is one.
     """
 
     bed: str

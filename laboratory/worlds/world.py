@@ -27,13 +27,7 @@ CLOUDS = (RAW, CLASSIFIED)
 
 @dataclass(frozen=True)
 class World:
-    """A world and its cloud.
-
-    Attributes
-    ----------
-    classification : Classification or None
-        None of a raw cloud.
-    """
+    """A world and its cloud, which is raw without a classification."""
 
     seed: int
     railway: Railway
@@ -87,13 +81,7 @@ class World:
 
 
 def make(seed: int, cloud: str = RAW) -> World:
-    """Make the world of a seed.
-
-    Parameters
-    ----------
-    cloud : str
-        One of `CLOUDS`: the world is the same, and raw or classified.
-    """
+    """Make the world of a seed, with one of `CLOUDS`: it is the same, and raw or classified."""
     railway = draw_railway(seed)
     around = draw_surroundings(seed, railway, draw_kind(seed))
     survey = draw_survey(seed, railway, around.half_width_m, around.rise, around.land != TUNNEL)
