@@ -245,13 +245,7 @@ def _largest(moved: Sequence[Difference]) -> str:
 
 
 def ablate(task: tuple[str, Sequence[str], str]) -> dict[str, list[Difference]]:
-    """Run a scene with all rules, and without each of those that have an effect in it.
-
-    Returns
-    -------
-    dict of str to list of Difference
-        By name of the rules that have an effect; the list has the figures that moved.
-    """
+    """Run a scene with all rules and without each; returns the figures that moved, by the rules that have an effect."""
     place, names, name = task
     variant = next(one for one in VARIANTS if one.name == name)
     scene = build_scene(place, variant.seed_shift)

@@ -14,10 +14,7 @@ from .notices import notices
 class QgisProgress(Progress):
     """Passes reports of the core to a QGIS feedback, and the state of its Cancel button back.
 
-    Parameters
-    ----------
-    definitions : sequence of QgsProcessingParameterDefinition
-        Parameters whose names may occur in messages.
+    Messages may name parameters of these definitions.
     """
 
     def __init__(

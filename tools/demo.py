@@ -68,17 +68,7 @@ def row(name: str, length_m: float, result: Comparison) -> str:
 
 
 def draw_map(cloud: Path, rails: Sequence[np.ndarray], centerlines: Sequence[np.ndarray], picture: Path) -> None:
-    """Draw the whole scene, a detail and the heights along the tracks.
-
-    Parameters
-    ----------
-    cloud : Path
-        File of the rail points.
-    rails, centerlines : sequence of (n, 3) array
-        In the coordinates of the cloud.
-    picture : Path
-        PNG to write.
-    """
+    """Draw the whole scene, a detail and the heights along the tracks as PNG; lines have the cloud's coordinates."""
     (points,) = read_rail_points(cloud, (RAIL_CLASS,))
     frame = points.frame
     rails, centerlines = [[frame.to_local(line) for line in lines] for lines in (rails, centerlines)]

@@ -54,15 +54,8 @@ class Rail:
 class Picture:
     """What a cross-section shows, metres to the right and up as seen along the track.
 
-    Attributes
-    ----------
-    points : (n, 2) array or None
-        None until they are read.
-    rails : (k, 2) array
-    missing : (k,) bool array
-        Whether a rail has no points here: it is where the line is drawn, or opposite to the other one.
-    note : str
-        What is missing, and why.
+    Points are None until they are read. A rail that is missing has no points here: it is where the line is drawn, or
+    opposite to the other one. The note says what is missing, and why.
     """
 
     points: np.ndarray | None
@@ -152,11 +145,7 @@ class Sections:
 class ReadingTask(QgsTask):
     """Reads the points of all sections from the cloud, in a thread of QGIS.
 
-    Parameters
-    ----------
-    places : mapping of int to (3,) array
-    done : callable
-        Called in the main thread with the points by id, and with a sentence if they could not be read.
+    `done` is called in the main thread with the points by id, and with a sentence if they could not be read.
     """
 
     def __init__(
