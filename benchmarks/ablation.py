@@ -50,15 +50,7 @@ SHOWN = 3
 
 @dataclass(frozen=True)
 class Switch:
-    """A rule and what stands in for it when it is off.
-
-    Attributes
-    ----------
-    name : str
-        Module and rule.
-    off : tuple of (str, str, object)
-        Module below `rail_extract.core`, name in it, and its value when the rule is off.
-    """
+    """A rule, and by module below `rail_extract.core` and name in it, the values that replace it when it is off."""
 
     name: str
     off: tuple[tuple[str, str, Any], ...]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from datetime import date
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -25,7 +26,7 @@ def las_data(
     scales: float | list[float] = SCALE_M,
     point_format: int = 6,
     version: str = "",
-    **dimensions: np.ndarray | int,
+    **dimensions: Any,
 ) -> laspy.LasData:
     """Return points, (n, 3), as LAS, with other values by the name of their dimension: (n,) each, or one for all.
 
@@ -45,7 +46,7 @@ def las_data(
     return points
 
 
-def write_las(path: Path, xyz: np.ndarray, *crs: str, **more) -> Path:
+def write_las(path: Path, xyz: np.ndarray, crs: str | None = None, **more: Any) -> Path:
     """Write points, compressed if the name ends in .laz; see `las_data`."""
-    las_data(xyz, *crs, **more).write(path)
+    las_data(xyz, crs, **more).write(path)
     return path

@@ -6,6 +6,7 @@ import argparse
 import json
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -30,8 +31,8 @@ TONES = np.array(
 
 def write_cloud(scene: Scene, path: Path) -> None:
     """Write a scene as LAS 1.4, compressed if the name ends in .laz."""
-    known = {"point_source_id": scene.strips, "gps_time": scene.times}
-    _write(scene, path, 6, classification=scene.classification, **known)
+    known = {"classification": scene.classification, "point_source_id": scene.strips, "gps_time": scene.times}
+    _write(scene, path, 6, known)
 
 
 def write_raw(scene: RawScene, path: Path) -> None:
@@ -40,21 +41,21 @@ def write_raw(scene: RawScene, path: Path) -> None:
     A survey by images has colours and the classes of a ground filter, but no intensity and no time (format 2); a scan
     has intensities and times (format 6).
     """
-    tone = TONES[scene.kind]
-    facts = {"return_number": 1, "number_of_returns": 1, "point_source_id": scene.strips}
-    if scene.classification is not None:
-        facts.update(classification=scene.classification, red=tone, green=tone, blue=tone)
-        _write(scene, path, 2, **facts)
+    tone, of_images = TONES[scene.kind], scene.classification is not None
+    known: dict[str, Any] = {"return_number": 1, "number_of_returns": 1, "point_source_id": scene.strips}
+    if of_images:
+        known.update(classification=scene.classification, red=tone, green=tone, blue=tone)
     else:
         times = np.arange(len(scene.xyz)) / POINTS_PER_S if scene.times is None else scene.times
-        _write(scene, path, 6, classification=1, intensity=tone, gps_time=times, **facts)
+        known.update(classification=1, intensity=tone, gps_time=times)
+    _write(scene, path, 2 if of_images else 6, known)
 
 
-def _write(scene: Scene | RawScene, path: Path, point_format: int, **dimensions) -> None:
+def _write(scene: Scene | RawScene, path: Path, point_format: int, values: dict[str, Any]) -> None:
     """Write points with those of the values that are known."""
-    known = {name: values for name, values in dimensions.items() if values is not None}
-    xyz, where = scene.frame.to_crs(scene.xyz), {"offsets": scene.frame.origin, "version": "1.4"}
-    write_las(path, xyz, scene.frame.crs_wkt, point_format=point_format, **where, **known)
+    known = {name: value for name, value in values.items() if value is not None}
+    xyz, crs, offsets = scene.frame.to_crs(scene.xyz), scene.frame.crs_wkt, scene.frame.origin
+    write_las(path, xyz, crs, offsets=offsets, version="1.4", point_format=point_format, **known)
 
 
 def write_truth(scene: Scene, path: Path) -> None:

@@ -86,7 +86,7 @@ def test_a_place_between_two_arms_of_a_hairpin_is_ambiguous():
 def test_on_a_ring_kilometres_run_once_round_and_either_end_is_meant_where_it_closes():
     angle = np.linspace(0, 2 * np.pi, 2001)
     axis = axis_of(on_circle(angle), 1.0)
-    found = locate([axis], on_circle(np.array([0.5, 1.5, 0.001]) * np.pi, 2.0), HECTOMETRES)
+    found = locate([axis], on_circle(np.array([0.5 * np.pi, 1.5 * np.pi, 0.001]), 2.0), HECTOMETRES)
     np.testing.assert_allclose(found.km[:2], 1 + axis.line.length_m / 1000 * np.array([0.25, 0.75]), atol=2e-5)
     assert found.ambiguous.tolist() == [False, False, True]
 
