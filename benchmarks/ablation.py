@@ -156,7 +156,7 @@ SWITCHES = (
     _rule("airborne.fitting.certainty", lambda course, *_: np.ones(len(course.across))),
     _rule("airborne.rounds.measure", lambda corridor, shape, shows: (shape, np.nan)),
     _rule("airborne.rounds.REACHES_M", (0.25,)),
-    _rule("airborne.cross_sections._other_spacing", lambda count, mean, u, shape: np.nan),
+    _rule("airborne.ridges._other_spacing", lambda count, mean, u, shape: np.nan),
     _rule("airborne.curves._distances", nothing),
     _rule("airborne.curves._spread", lambda *_: 1.0),
     _rule("airborne.curves.OUTLIER", np.inf),

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.sparse import block_diag, csr_matrix, diags, vstack
 
 from ..polyline import Polyline, cross
-from .cross_sections import STATION_M, Sections
+from .ridges import STATION_M, Sections
 from .search import parallel
 
 LITTLE = 1e-12

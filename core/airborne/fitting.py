@@ -10,11 +10,9 @@ from scipy.spatial import cKDTree
 
 from ..polyline import Polyline
 from ..progress import SILENT, Progress
-from .cross_sections import EDGE_M, STATION_M
 from .guide_line import SECTION_M, Points, gather
-from .ridges import HALF_M, Shape
-from .rivals import LONG, TRACKS_APART_M, WIDE_M, Beside, look_beside
-from .rounds import REACHES_M, Refined, Traced, refine, strip_error
+from .ridges import EDGE_M, HALF_M, STATION_M, Shape
+from .rounds import LONG, REACHES_M, TRACKS_APART_M, WIDE_M, Beside, Refined, Traced, look_beside, refine, strip_error
 from .search import Course, Evidence, certainty, courses, evidence, groups, slopes
 
 LONG_GAIN, LONG_SHARE = 7.0, 0.25

@@ -15,11 +15,24 @@ from ..parameters import JUMPS, FitParameters
 from ..polyline import Polyline, runs
 from ..progress import SILENT, Progress
 from .chain import Chain
-from .deviations import Deviations, deviations_of
 from .elements import Alignment, Element, PlanElement
-from .held import Given, given_along, given_of, moved, noted, off_element, with_round_radii, without
-from .layouts import cants, chain_errors, heights, on_clothoids, plan_errors, remaining
-from .measured import LEAST_POINTS, Measured, Track, lateral_signal, measured_of
+from .layouts import (
+    Given,
+    cants,
+    chain_errors,
+    given_along,
+    given_of,
+    heights,
+    moved,
+    noted,
+    off_element,
+    on_clothoids,
+    plan_errors,
+    remaining,
+    with_round_radii,
+    without,
+)
+from .measured import LEAST_POINTS, Deviations, Measured, Track, deviations_of, lateral_signal, measured_of
 from .noise import Noise, strays
 from .plane_fit import FitError, PlanFit, Points, fit_plan
 from .signals import CANT, HEIGHT, PLAN, Kind, Signal, find_structure, noise_of, refitted

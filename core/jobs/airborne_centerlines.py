@@ -58,8 +58,7 @@ def _class_codes(values: Values) -> tuple[int, ...]:
 
 def _run(values: Values, progress: Progress) -> Result:
     """Fit the tracks along the guides."""
-    from ..airborne.files import survey_files
-    from ..airborne.reading import Run
+    from ..airborne.files import Run, survey_files
     from .result import ShownCloud
 
     progress, standard, codes = Estimating(progress), values.standard(), _class_codes(values)

@@ -25,8 +25,8 @@ from .declaration import (
 )
 
 if TYPE_CHECKING:
-    from ..alignment.deviations import Deviations
     from ..alignment.fit import Fit
+    from ..alignment.measured import Deviations
     from ..progress import Progress
     from .result import Result
     from .values import Values

@@ -22,8 +22,8 @@ from .declaration import (
 )
 
 if TYPE_CHECKING:
-    from ..alignment.deviations import Deviations
     from ..alignment.elements import Alignment
+    from ..alignment.measured import Deviations
     from ..progress import Progress
     from .result import Result
     from .values import Values
@@ -95,7 +95,7 @@ def _compared(
     values: Values, alignments: Sequence[Alignment], progress: Progress
 ) -> list[tuple[Alignment, Deviations]]:
     """Return the deviations of each track with the alignment beside it; none without tracks."""
-    from ..alignment.deviations import compared_with
+    from ..alignment.measured import compared_with
     from .reading import check_same_plane, read_tracks
 
     if not values.filled("TRACKS"):

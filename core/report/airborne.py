@@ -7,9 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..airborne.cross_sections import STATION_M
-from ..airborne.remarks import FLIGHT
-from ..airborne.survey import AirborneTrack, Survey
+from ..airborne.ridges import STATION_M
+from ..airborne.survey import FLIGHT, AirborneTrack, Survey
 from ..checks.listing import OFF_RAIL_MM, Finding
 from ..progress import counted, metres, written
 from .markup import legend, made, page, section, table, verdict_box

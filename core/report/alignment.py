@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from ..alignment.deviations import Deviations
 from ..alignment.elements import Alignment, CantElement, Element, PlanElement, VerticalElement
+from ..alignment.measured import Deviations
 from ..alignment.stations import StationRange, stations_of
 from ..checks.findings import largest, rms
 from ..progress import metres
