@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from functools import partial
+from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -28,7 +29,6 @@ from ..progress import Progress
 from ..run.loop import Runner
 from ..run.processes import workers
 from ..scratch import scratch_folder
-from .options import vector_module
 
 if TYPE_CHECKING:
     from ..jobs.features import Source
@@ -345,3 +345,16 @@ def destinations_of(job: Job, files: Mapping[str, Path]) -> dict[str, Destinatio
             raise ParameterError(f"{other} and {one.name} are the same file: give each its own name.")
         found[one.name] = shared.setdefault(destination.file, destination)
     return found
+
+
+def vector_module(option: str, name: str = "vectors") -> Any:
+    """Return the module that reads vector files, or another one of this package that needs the same packages.
+
+    Raises ParameterError if the packages are not installed; `option` is what needs them.
+    """
+    try:
+        return import_module(f".{name}", __package__)
+    except ImportError as error:
+        raise ParameterError(
+            f"{option} needs the packages pyogrio and shapely: in a clone, run pip install .[cluster]."
+        ) from error

@@ -61,8 +61,8 @@ def model_for(header: RasterHeader, standard: RailStandard, name: str) -> Model:
 def _run(values: Values, progress: Progress) -> Result:
     """Clean each band."""
     from ..frpdf.cleanup import clean
-    from ..frpdf.engines import make_engine
-    from ..frpdf.weights import load_arrays
+    from ..frpdf.engine import make_engine
+    from ..frpdf.models import load_arrays
     from .result import Result
 
     header, model = _planned(values)

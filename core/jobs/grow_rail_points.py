@@ -114,7 +114,7 @@ def _check(values: Values) -> None:
 def _run(values: Values, progress: Progress) -> Result:
     """Follow the rails and write the copy."""
     from ..files.layers import stops_layer
-    from ..grow.settings import GrowSettings
+    from ..grow.heads import GrowSettings
     from ..labelling.files import Choice, plan_output
     from ..labelling.growing import grow_files
     from ..run.loop import Runner

@@ -22,7 +22,7 @@ def _check(values: Values) -> None:
 
 def _run(values: Values, progress: Progress) -> Result:
     """Rasterize each class."""
-    from ..checks.density import plausible
+    from ..checks.points import plausible
     from ..files.raster_file import header_for
     from ..raster import cell_size, rasterize
     from ..tiles.grid import MemorySource

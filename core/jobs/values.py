@@ -248,7 +248,7 @@ class Values(ABC):
 
     def engine(self) -> str:
         """Read ENGINE, and check that it is installed and runs on DEVICE."""
-        from ..frpdf.engines import choose_engine
+        from ..frpdf.engine import choose_engine
 
         return choose_engine(self["ENGINE"], self["DEVICE"])
 

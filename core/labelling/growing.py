@@ -18,8 +18,7 @@ from ..clouds.points import Request
 from ..disk import writing
 from ..errors import OffCloudError, OffRailError
 from ..grow.growth import APART, Growth, Growths, Stop, apart_first
-from ..grow.heads import OnHeads
-from ..grow.settings import GrowSettings
+from ..grow.heads import GrowSettings, OnHeads
 from ..polyline import Polyline
 from ..progress import SILENT, Progress
 from ..rails import SearchFigures

@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from .. import checks
-from ..checks.density import occupied_squares, plausible
 from ..checks.doubts import doubting_scatter, strip_courses
+from ..checks.points import occupied_squares, plausible
 from ..checks.standard import warn_of_spacing
 from ..clouds.points import RailPoints
 from ..errors import NoRailPointsError, NoTrackError, RailExtractError

@@ -16,7 +16,7 @@ from ..clouds.header import CloudHeader
 from ..clouds.points import AIRBORNE, Request, read_each
 from ..disk import writing
 from ..errors import CloudError, NoRailPointsError, RailExtractError
-from ..grow.settings import GrowSettings
+from ..grow.heads import GrowSettings
 from ..labelling.finding import find_rail_points, report
 from ..labelling.growing import grow_points
 from ..parameters import Parameters

@@ -7,8 +7,8 @@ from rail_extract.core.clouds.points import ask
 from rail_extract.core.clouds.vpc import list_tiles
 from rail_extract.core.errors import ParameterError, RailExtractError
 from rail_extract.core.grow import growth as many_seeds
-from rail_extract.core.grow.follow import Reason
-from rail_extract.core.grow.settings import GrowSettings
+from rail_extract.core.grow.growth import Reason
+from rail_extract.core.grow.heads import GrowSettings
 from rail_extract.core.grow.start import find_start
 from rail_extract.core.labelling.files import Choice, plan_output
 from rail_extract.core.labelling.growing import grow_files
