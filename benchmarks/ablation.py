@@ -111,7 +111,7 @@ SWITCHES = (
     _rule("tracks.chaining._facing", lambda *_: np.empty((0, 2), dtype=int)),
     _rule("tracks.chaining.MAX_HIDDEN_M", 0.0),
     _rule("tracks.centerlines.fork_centerlines", lambda lines, *_: list(lines)),
-    _rule("tracks.forking.BENT_M", np.inf),
+    _rule("tracks.centerlines.BENT_M", np.inf),
     _rule("tracks.centerlines.started_abreast", lambda rails: list(rails)),
     _rule("tracks.centerlines.at_gauge", lambda left, right, *_: (left, right)),
     _rule("tracks.centerlines._smoothed", first),

@@ -32,7 +32,7 @@ from rail_extract.core.clouds.readers import list_files
 from rail_extract.core.disk import Destination, identity
 from rail_extract.core.fields import RAILS
 from rail_extract.core.files.layers import lines_layer
-from rail_extract.core.files.raster_file import header_for
+from rail_extract.core.files.rail_rasters import header_for
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.labelling.files import Choice, Labels, Output, write_labelled
 from rail_extract.core.progress import SILENT

@@ -17,8 +17,7 @@ from ..clouds.crs import MAX_COORDINATE, is_geographic, parse_crs
 from ..clouds.readers import CATALOGUE, paths_of
 from ..disk import Destination, writing
 from ..errors import CrsError, ParameterError, RailExtractError
-from ..files.rail_rasters import RasterSource, open_with_rasterio
-from ..files.raster_file import write_rasters
+from ..files.rail_rasters import RasterSource, open_with_rasterio, write_rasters
 from ..jobs import declaration as kinds
 from ..jobs.clouds import Bounds, CloudSource
 from ..jobs.declaration import Job, Parameter

@@ -15,7 +15,7 @@ from .clouds import Bounds, BoundsIn, CloudSource, crs_of, read_points, spool_po
 from .reading import check_same_plane
 
 if TYPE_CHECKING:
-    from ..tiles.spool import SpooledPoints
+    from ..tiles.store import SpooledPoints
 
 Points = TypeVar("Points", RailPoints, "SpooledPoints")
 

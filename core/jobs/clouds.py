@@ -14,7 +14,7 @@ from ..standards import RAIL_CLASS
 if TYPE_CHECKING:
     from ..clouds.mask import Mask
     from ..clouds.points import RailPoints, Request
-    from ..tiles.spool import SpooledPoints
+    from ..tiles.store import SpooledPoints
 
 Bounds = tuple[float, float, float, float]
 """Smallest x, smallest y, largest x, largest y."""
@@ -78,7 +78,7 @@ def spool_points(
     progress: Progress,
 ) -> tuple[SpooledPoints, ...]:
     """Sort the points of the rail classes into squares of `side_m` in `folder`, so that a cloud of any size fits."""
-    from ..tiles.spool import spool
+    from ..tiles.store import spool
 
     return spool(request_points(source, class_codes, bounds, progress), side_m, folder, progress)
 

@@ -139,7 +139,7 @@ def _result(values: Values, network: RailNetwork, origin: Origin) -> Result:
 
 def _cleaned(values: Values, network: RailNetwork, standard: RailStandard) -> Rasters | None:
     """Return the network's output as Clean Rail Raster writes it; None if no rail cell is left."""
-    from ..files.raster_file import header_for, on_one_grid
+    from ..files.rail_rasters import header_for, on_one_grid
 
     if not any(raster.tiles for raster in network.cleaned):
         return None

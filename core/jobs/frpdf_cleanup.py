@@ -12,7 +12,7 @@ from . import outputs, shared
 from .declaration import RAIL_WORDS, STEPS, Job, RasterOutput
 
 if TYPE_CHECKING:
-    from ..files.raster_file import RasterHeader
+    from ..files.rail_rasters import RasterHeader
     from ..progress import Progress
     from ..standards import RailStandard
     from .result import Result

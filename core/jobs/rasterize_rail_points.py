@@ -23,7 +23,7 @@ def _check(values: Values) -> None:
 def _run(values: Values, progress: Progress) -> Result:
     """Rasterize each class."""
     from ..checks.points import plausible
-    from ..files.raster_file import header_for
+    from ..files.rail_rasters import header_for
     from ..raster import cell_size, rasterize
     from ..tiles.grid import MemorySource
     from .clouds import read_points

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from ..design_numbers import KM
 from ..frpdf import DEVICES, ENGINES, MAX_PASSES
 from ..frpdf.models import NAMES
-from ..kilometres.text import HECTOMETRES, NOTATIONS
+from ..kilometres.stationing import HECTOMETRES, NOTATIONS
 from ..parameters import (
     DEFAULT_STEP_M,
     DEFAULT_WORKERS,

@@ -13,7 +13,7 @@ from ..frame import LocalFrame
 from ..progress import Progress
 from ..rails import Centerline, RailLine, TrackGeometry
 from ..standards import RAIL_CLASS
-from ..tiles.spool import SpooledPoints
+from ..tiles.store import SpooledPoints
 from .area_points import Area, spool_points_in
 from .clouds import Bounds
 from .reading import way

@@ -12,7 +12,7 @@ from . import outputs, shared
 from .declaration import CLOUD_NEEDS, CLOUD_WORDS, RAIL_WORDS, RAW_CLOUDS, Figure, FileInput, FileOutput, Job, Number
 
 if TYPE_CHECKING:
-    from ..learned.examples import Plan
+    from ..learned.blocks import Plan
     from ..progress import Progress
     from .result import Result
     from .values import Values
@@ -23,7 +23,7 @@ MAX_EPOCHS, MAX_SEED = 10_000, 2**31 - 1
 
 def _plan(values: Values) -> Plan:
     """Return what the training is given, besides the cloud."""
-    from ..learned.examples import Plan
+    from ..learned.blocks import Plan
 
     return Plan(values.class_codes(), values["EPOCHS"], values["SEED"], values["DEVICE"], values["START"])
 

@@ -20,8 +20,7 @@ from ..polyline import Polyline
 from ..progress import SILENT, Progress
 from ..rails import Kilometres, TrackGeometry
 from .line import KilometreLine, locate, nearest
-from .stationing import Jump, Stationing, stationing_of
-from .text import read_km
+from .stationing import Jump, Stationing, read_km, stationing_of
 
 POST_OFFSET_M = 50.0
 """Posts further than this from the axis are left out, metres: they belong to another line."""

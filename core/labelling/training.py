@@ -18,7 +18,7 @@ from ..clouds.points import Request
 from ..disk import Destination, writing
 from ..errors import NoRailPointsError, ParameterError
 from ..kernels import device_of
-from ..learned.examples import CHECKS, Examples, Plan, save_index, write_square
+from ..learned.blocks import CHECKS, Examples, Plan, save_index, write_square
 from ..learned.model import WEIGHTS_SUFFIX, check_torch, load, save
 from ..progress import SILENT, Progress
 from ..run.loop import Runner

@@ -22,7 +22,7 @@ from torch.nn import functional
 from ..errors import Cancelled, ModelError, ParameterError
 from ..kernels import device_of
 from ..progress import SILENT, Progress
-from .examples import Examples
+from .blocks import Examples
 from .model import in_groups, inputs, load
 from .network import RandLaNet, parameter_count
 

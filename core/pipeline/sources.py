@@ -28,7 +28,7 @@ from ..scratch import scratch_folder
 from ..squares.steps import square_side
 from ..standards import RAIL_CLASS
 from ..tiles.grid import SortedPoints
-from ..tiles.spool import Census, SpooledFile, gather, spool_file
+from ..tiles.store import Census, SpooledFile, gather, spool_file
 
 READING = 0.2
 """Run time of sorting rail points relative to that of the walk, for the progress."""

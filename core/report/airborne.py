@@ -13,7 +13,7 @@ from ..checks.listing import OFF_RAIL_MM, Finding
 from ..progress import counted, metres, written
 from .markup import legend, made, page, section, table, verdict_box
 from .origin import stated
-from .plan import Course, draw_plan
+from .plots import Course, draw_plan
 
 GOOD_SHARE, FAIR_SHARE = 0.95, 0.7
 """Shares of the guides' length that must be seen for a verdict of good, and of usable."""

@@ -13,8 +13,7 @@ from ..progress import metres, written
 from ..rails import ENOUGH_CELLS_PER_M, RailNetwork, SearchFigures
 from .limits import limits_table
 from .markup import figure, legend, made, note, page, section, table, tag, text, tiles, verdict_box
-from .plan import Course, draw_plan
-from .track_plots import draw_profiles, draw_strips
+from .plots import Course, draw_plan, draw_profiles, draw_strips
 
 CLASSES_ADVICE = (
     "Rail classes: choose the class of the rails; in a raw cloud, which has none, have the rail points found."

@@ -11,7 +11,7 @@ from .markup import made, note, page, section, table, verdict_box
 from .plots import Curve, Panel, draw_panels
 
 if TYPE_CHECKING:
-    from ..learned.examples import Plan
+    from ..learned.blocks import Plan
     from ..learned.training import Figures, Trained
     from ..standards import RailStandard
 

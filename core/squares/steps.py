@@ -31,8 +31,7 @@ from ..raster import TILE, RailRaster, cell_size, rasterize
 from ..tiles.grid import HALO_M, OVERLAP_M, Key, PointSource, Square, mosaic, own_tiles
 from ..tracks.parallels import widths_by_gauge
 from ..vectorize import vectorize
-from .pieces import SquareRails, trim
-from .seams import join
+from .seams import SquareRails, join, trim
 
 VECTORIZE, SMOOTH, REFINE, ELEVATE = 0.45, 0.05, 0.25, 0.25
 """Relative run times of the steps from a raster to lines, for the progress."""

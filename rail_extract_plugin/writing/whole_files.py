@@ -16,7 +16,7 @@ from qgis.core import (
 
 from ...core.disk import Destination
 from ...core.errors import RailExtractError
-from ...core.files.geopackage import tables_in
+from ...core.files.writing import tables_in
 from ...core.scratch import scratch_folder
 from ..dialog.parameter_values import ParameterValues
 from .destinations import appends, output_file, table_of

@@ -118,7 +118,7 @@ def _read_spool(path: Path) -> None:
 
 def _spooled(cloud: Path, folder: Path) -> Sequence:
     from rail_extract.core.clouds.points import ask
-    from rail_extract.core.tiles.spool import spool
+    from rail_extract.core.tiles.store import spool
 
     return spool(ask(cloud, [RAIL]), SPOOL_SIDE_M, folder)
 
@@ -129,7 +129,7 @@ def _make_stored(folder: Path) -> list[Path]:
     from rail_extract.core.rails import RailLine
     from rail_extract.core.raster import rasterize
     from rail_extract.core.squares.kept import save
-    from rail_extract.core.squares.pieces import SquareRails
+    from rail_extract.core.squares.seams import SquareRails
     from rail_extract.core.tiles.grid import Square
 
     xyz = np.random.default_rng(0).uniform(0, 20, (500, 3))
