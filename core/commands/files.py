@@ -15,7 +15,7 @@ import numpy as np
 
 from ..clouds.crs import MAX_COORDINATE, is_geographic, parse_crs
 from ..clouds.readers import CATALOGUE, paths_of
-from ..disk import Destination, writing
+from ..disk import Destination, scratch_folder, writing
 from ..errors import CrsError, ParameterError, RailExtractError
 from ..files.rail_rasters import RasterSource, open_with_rasterio, write_rasters
 from ..jobs import declaration as kinds
@@ -27,7 +27,6 @@ from ..jobs.values import Values
 from ..progress import Progress
 from ..run.loop import Runner
 from ..run.processes import workers
-from ..scratch import scratch_folder
 
 if TYPE_CHECKING:
     from ..jobs.features import Source

@@ -96,7 +96,7 @@ def _run(values: Values, progress: Progress) -> Result:
 def _survey(values: Values, name: str, frame: LocalFrame | None, progress: Progress) -> tuple[Survey, LocalFrame]:
     """Read one survey in a frame; without one, in its own, which is returned as well."""
     from ..comparison.tracks import Survey
-    from .reading import way
+    from .lines import way
 
     rails, sigma = SURVEYS[name]
     lines = values.lines(name, progress)

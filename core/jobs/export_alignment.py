@@ -42,7 +42,7 @@ def _check(values: Values) -> None:
 def _run(values: Values, progress: Progress) -> Result:
     """Read the table, check it and write the file."""
     from ..files.design_files import check_designs, left_out, write_designs
-    from .reading import read_elements
+    from .lines import read_elements
     from .result import Result
 
     alignments = read_elements(values, "INPUT", values["CRS"], progress.span(0, READING))

@@ -1,4 +1,4 @@
-"""What jobs read from vector layers, checked in one place: lines, guides, seeds, masks, axes and tables.
+"""What jobs read from vector layers, checked in one place: lines, guides, seeds, masks, axes, tables, and places.
 
 QGIS reads layers itself, the command line and Python with pyogrio and shapely; both provide a `Source`.
 """
@@ -15,7 +15,7 @@ import numpy as np
 from ..airborne.survey import Guide, gauge_of
 from ..clouds.crs import parse_crs, title_of, unit_in_plan
 from ..clouds.mask import Mask
-from ..design_places import check_line, check_places
+from ..design_numbers import check_line, check_places
 from ..errors import CrsError, MissingError, ParameterError, RailExtractError
 from ..kilometres.axes import (
     AHEAD,
@@ -39,6 +39,12 @@ from .shared import DECREASING
 
 if TYPE_CHECKING:
     from .values import Rows, Values
+
+
+from ..design_numbers import are_places
+
+FAR, NOWHERE = np.full(2, np.inf), np.full(2, np.nan)
+"""Places of a feature that is not on any map, and of one without a geometry."""
 
 
 @dataclass(frozen=True)
@@ -270,3 +276,44 @@ def _jumps(source: Source) -> list[Jump]:
     """Read the table of jumps."""
     check_jumps(source.fields)
     return [Jump(*(km_of(row[name], name, "JUMPS", number) for name in (BACK, AHEAD))) for number, row in source.rows()]
+
+
+@dataclass(frozen=True)
+class Places:
+    """Features of a layer in the plane of an axis.
+
+    `xy`, (n, 2), is where each counts: half way along a line, inside a polygon, in the mean of points; else `FAR` or
+    `NOWHERE`. `vertices`, (m, 2), are those of all features, of a polygon those of its outer ring, and `owner`, (m,),
+    the number of the feature of each. `originals` is for a `Copy` with further fields.
+    """
+
+    ids: Sequence[int]
+    xy: np.ndarray
+    vertices: np.ndarray
+    owner: np.ndarray
+    are_points: bool
+    originals: Source
+
+
+def places_of(source: Source, plane: str | None, progress: Progress) -> Places:
+    """Read where the features of a layer count in the plane of axes."""
+    for notice in source.notices:
+        progress.warning(notice)
+    features, unit_m = list(progress.follow(source.features(plane), source.count)), unit_in_plan(plane)
+    shapes = [np.concatenate([np.empty((0, 4)), *(part for _, part in one.parts)])[:, :2] for one in features]
+    xy = [_place(feature, shape, unit_m) for feature, shape in zip(features, shapes)]
+    return Places(
+        [feature.number for feature in features],
+        np.reshape(xy, (-1, 2)),
+        np.concatenate([np.empty((0, 2)), *shapes]),
+        np.repeat(np.arange(len(shapes)), list(map(len, shapes))),
+        source.kinds == {POINT},
+        source,
+    )
+
+
+def _place(feature: Feature, shape: np.ndarray, unit_m: float) -> np.ndarray:
+    """Return where a feature with these vertices, (n, 2), counts."""
+    if feature.is_lost or not are_places(shape, unit_m).all():
+        return FAR
+    return feature.middle() if len(shape) else NOWHERE

@@ -52,7 +52,7 @@ def _run(values: Values, progress: Progress) -> Result:
     from ..files.layers import elements_layer, stations_layer
     from ..progress import Recording
     from ..report import build_alignment_page
-    from .reading import read_elements, read_tracks
+    from .lines import read_elements, read_tracks
     from .result import Result
 
     progress = Recording(progress)

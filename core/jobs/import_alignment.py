@@ -96,7 +96,8 @@ def _compared(
 ) -> list[tuple[Alignment, Deviations]]:
     """Return the deviations of each track with the alignment beside it; none without tracks."""
     from ..alignment.measured import compared_with
-    from .reading import check_same_plane, read_tracks
+    from .clouds import check_same_plane
+    from .lines import read_tracks
 
     if not values.filled("TRACKS"):
         return []

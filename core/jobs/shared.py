@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from ..design_numbers import KM
 from ..frpdf import DEVICES, ENGINES, MAX_PASSES
@@ -38,9 +37,6 @@ from .declaration import (
     System,
     Text,
 )
-
-if TYPE_CHECKING:
-    pass
 
 # The maxima below only reject values that must be millimetres in a field of metres; they are not recommendations.
 

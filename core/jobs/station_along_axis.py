@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from ..kilometres.axes import PlacedAxes
     from ..progress import Progress
-    from .places import Places
+    from .features import Places
     from .result import Result
     from .values import Values
 

@@ -14,9 +14,8 @@ from ..progress import Progress
 from ..rails import Centerline, RailLine, TrackGeometry
 from ..standards import RAIL_CLASS
 from ..tiles.store import SpooledPoints
-from .area_points import Area, spool_points_in
-from .clouds import Bounds
-from .reading import way
+from .clouds import Area, Bounds, spool_points_in
+from .lines import way
 from .values import Values
 
 MARGIN_M = 1.0

@@ -36,9 +36,8 @@ if TYPE_CHECKING:
     from ..kilometres.axes import PlacedAxes
     from ..progress import Progress
     from ..run.loop import Runner
-    from .features import Source
+    from .features import Places, Source
     from .lines import Lines
-    from .places import Places
 
 NUMBERS = {
     "SMOOTHING_XY": "smoothing_xy_m",
@@ -175,7 +174,7 @@ class Values(ABC):
 
     def places(self, name: str, plane: str | None, progress: Progress) -> Places:
         """Read the features of a layer of any kind, in the plane of the axes; see `places_of`."""
-        from .places import places_of
+        from .features import places_of
 
         return places_of(self.source(name), plane, progress)
 

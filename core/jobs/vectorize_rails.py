@@ -37,7 +37,7 @@ def _run(values: Values, progress: Progress) -> Result:
     from ..checks.lines import warn_of_rails
     from ..files.layers import lines_layer
     from ..squares.steps import lines_of
-    from .area_points import Area, read_points_in
+    from .clouds import Area, read_points_in
     from .result import Result, ShownCloud
 
     source, header = values.raster("INPUT"), values.raster("INPUT").header

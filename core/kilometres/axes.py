@@ -12,8 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..design_numbers import KM, LENGTH, NUMBER, checked, number_in, quoted
-from ..design_places import are_places, check_places
+from ..design_numbers import KM, LENGTH, NUMBER, are_places, check_places, checked, number_in, quoted
 from ..errors import RailExtractError
 from ..frame import LocalFrame
 from ..polyline import Polyline

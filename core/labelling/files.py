@@ -14,14 +14,13 @@ from ..clouds.points import Request
 from ..clouds.readers import CATALOGUE, SUFFIXES, list_files
 from ..clouds.rewriting import Places, check_class, rewrite
 from ..clouds.vpc import catalogue_text
-from ..disk import NEW, Destination, alone_in, identity, replace_folder, writing
+from ..disk import NEW, Destination, alone_in, identity, replace_folder, scratch_folder, writing
 from ..errors import DiskError, ParameterError, RailExtractError
 from ..grow.growth import Stop
 from ..progress import SILENT, Progress
 from ..rails import SearchFigures
 from ..run.loop import Runner
 from ..run.tasks import READ_S, Context, Task
-from ..scratch import scratch_folder
 from ..standards import RAIL_CLASS
 from .finding import find_rail_points, report
 

@@ -15,14 +15,13 @@ import numpy as np
 
 from ..classify.settings import Settings
 from ..clouds.points import Request
-from ..disk import Destination, writing
+from ..disk import Destination, scratch_folder, writing
 from ..errors import NoRailPointsError, ParameterError
 from ..kernels import device_of
 from ..learned.blocks import CHECKS, Examples, Plan, save_index, write_square
 from ..learned.model import WEIGHTS_SUFFIX, check_torch, load, save
 from ..progress import SILENT, Progress
 from ..run.loop import Runner
-from ..scratch import scratch_folder
 from ..tiles.grid import Square
 from ..tiles.store import files_of, read_stored
 from .finding import POINT, sort_files

@@ -14,7 +14,7 @@ from ..checks.standard import warn_of_gauge, warn_of_raw
 from ..classify.settings import Settings
 from ..clouds.header import CloudHeader
 from ..clouds.points import AIRBORNE, Request, read_each
-from ..disk import writing
+from ..disk import scratch_folder, writing
 from ..errors import CloudError, NoRailPointsError, RailExtractError
 from ..grow.heads import GrowSettings
 from ..labelling.finding import find_rail_points, report
@@ -24,7 +24,6 @@ from ..progress import Progress
 from ..rails import SearchFigures
 from ..run.loop import Runner
 from ..run.tasks import Context
-from ..scratch import scratch_folder
 from ..squares.steps import square_side
 from ..standards import RAIL_CLASS
 from ..tiles.grid import SortedPoints

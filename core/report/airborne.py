@@ -12,7 +12,7 @@ from ..airborne.survey import FLIGHT, AirborneTrack, Survey
 from ..checks.listing import OFF_RAIL_MM, Finding
 from ..progress import counted, metres, written
 from .markup import legend, made, page, section, table, verdict_box
-from .origin import stated
+from .page import stated
 from .plots import Course, draw_plan
 
 GOOD_SHARE, FAIR_SHARE = 0.95, 0.7

@@ -20,10 +20,10 @@ from distributed import Client, Future, LocalCluster
 from distributed import TimeoutError as NoAnswer
 from distributed.security import Security
 
+from ..disk import scratch_folder, sweep
 from ..errors import ParameterError, RailExtractError, WorkerError
 from ..kernels import ENVIRONMENT
 from ..progress import Progress
-from ..scratch import scratch_folder, sweep
 from .loop import Answer, Executor, Heard, next_of
 from .processes import worker_count
 from .tasks import CORE, Context, Once, Task, version

@@ -18,13 +18,12 @@ from typing import Any
 
 import numpy as np
 
-from ..disk import writing
+from ..disk import discard, scratch_folder, sweep, writing
 from ..errors import RailExtractError
 from ..frame import LocalFrame
 from ..rails import RailLine, Support
 from ..raster import RailRaster
 from ..run.tasks import Context, Task, version
-from ..scratch import discard, scratch_folder, sweep
 from ..tiles.grid import Square
 from ..tiles.store import SpooledPoints
 from .seams import SquareRails

@@ -22,10 +22,9 @@ from ..clouds.on_heads import heads_of
 from ..clouds.passes import number_passes
 from ..clouds.points import RailPoints, Request, origin_steps
 from ..clouds.readers import CloudHeader
-from ..disk import writing
+from ..disk import discard, scratch_folder, writing
 from ..frame import LocalFrame
 from ..progress import SILENT, Progress
-from ..scratch import discard, scratch_folder
 from .grid import Key, Square, Tiling, around
 
 REPORT = "report.json"

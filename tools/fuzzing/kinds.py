@@ -240,9 +240,9 @@ def _read_names(path: Path) -> None:
 
 def _make_moving(folder: Path) -> list[Path]:
     """Write the temporary folder of a run that was killed while it moved the files of a shapefile."""
-    from rail_extract.core import disk, scratch
+    from rail_extract.core import disk
 
-    killed = folder / f"{scratch.PREFIX}{'0' * 12}"
+    killed = folder / f"{disk.PREFIX}{'0' * 12}"
     for name in (disk.NEW, disk.OLD):
         (killed / name).mkdir(parents=True)
         (killed / name / "a.shp").write_bytes(b"shp")
@@ -253,10 +253,10 @@ def _make_moving(folder: Path) -> list[Path]:
 
 def _read_moving(path: Path) -> None:
     """Complete an interrupted move, as the next run does: nothing is written outside of the folder."""
-    from rail_extract.core import disk, scratch
+    from rail_extract.core import disk
 
     folder = path.parents[1]
-    os.utime(path.parent, (0, time.time() - scratch.MIN_UNMARKED_AGE_S - 1))
+    os.utime(path.parent, (0, time.time() - disk.MIN_UNMARKED_AGE_S - 1))
     disk.Destination.at(folder / "next.txt")
     if path.exists():
         raise AssertionError("the temporary folder is still there")
