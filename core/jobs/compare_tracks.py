@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import ParameterError
 from ..fields import DIFFERENCE_FIELDS
 from ..parameters import ComparisonParameters
-from . import outputs, shared
+from . import methods, outputs
 from .declaration import (
     ALIGNMENT,
     LINE_NEEDS,
@@ -187,7 +187,7 @@ JOB = Job(
             advanced=True,
             default=ComparisonParameters.step_m,
             low=0.1,
-            high=shared.MAX_LENGTH_M,
+            high=methods.MAX_LENGTH_M,
         ),
     ),
     (

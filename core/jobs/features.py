@@ -34,8 +34,8 @@ from ..kilometres.axes import (
 from ..kilometres.stationing import Jump
 from ..progress import Progress
 from .declaration import LINE, POINT, POLYGON
+from .inputs import DECREASING
 from .lines import Lines, Row, system_of, without_steps
-from .shared import DECREASING
 
 if TYPE_CHECKING:
     from .values import Rows, Values

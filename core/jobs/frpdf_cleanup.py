@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from ..errors import RasterError
 from ..frpdf.models import MODELS, Model, choose
-from . import outputs, shared
+from . import inputs, methods, outputs
 from .declaration import RAIL_WORDS, STEPS, Job, RasterOutput
 
 if TYPE_CHECKING:
@@ -86,7 +86,7 @@ JOB = Job(
     "A raster from other software does not state its gauge and railhead width: fill them in.",
     (*RAIL_WORDS, "raster", "neural network", "deep learning", "clean", "repair", "gaps", "noise"),
     (("numpy",), ("pyproj",), ("cv2", "torch")),
-    (shared.RASTER, shared.MODEL, *shared.CLEANUP, *shared.RASTER_RAIL),
+    (inputs.RASTER, methods.MODEL, *methods.CLEANUP, *inputs.RASTER_RAIL),
     (RasterOutput("OUTPUT", "Cleaned rail raster", "A GeoTIFF; the input of Vectorize Rails."),),
     (outputs.ENGINE_USED,),
     STEPS,

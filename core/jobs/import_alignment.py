@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ..errors import CrsError, ParameterError
-from . import outputs, shared
+from . import inputs, outputs
 from .declaration import (
     ALIGNMENT,
     ALIGNMENT_WORDS,
@@ -127,7 +127,7 @@ JOB = Job(
             kinds="LandXML files (*.xml *.landxml);;All files (*)",
         ),
         replace(
-            shared.CRS,
+            inputs.CRS,
             label="CRS of a file without one",
             help="Projected coordinate system in metres for a file that does not state one; other files keep their "
             "own.",
@@ -155,7 +155,7 @@ JOB = Job(
             optional=True,
             kinds=(POINT,),
         ),
-        shared.RAILS_OF_CANT,
+        inputs.RAILS_OF_CANT,
     ),
     (
         outputs.ELEMENTS_OUTPUT,

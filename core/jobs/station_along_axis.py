@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from ..errors import CrsError, RailExtractError
 from ..fields import EXTENT_FIELDS, STATION_FIELDS
-from . import shared
+from . import inputs
 from .declaration import ALIGNMENT, LINE_NEEDS, PLACES, RAIL_WORDS, Figure, Job, LayerInput, LayerOutput
 
 if TYPE_CHECKING:
@@ -107,7 +107,7 @@ JOB = Job(
             "Points, lines or polygons. A line counts where it is half way, a polygon at a place inside.",
             kinds=(PLACES,),
         ),
-        *shared.axis(optional=False),
+        *inputs.axis(optional=False),
     ),
     (
         LayerOutput(

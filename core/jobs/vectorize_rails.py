@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ..fields import RAILS
-from . import outputs, shared
+from . import inputs, methods, outputs
 from .declaration import CLOUD_NEEDS, CLOUD_WORDS, RAIL_WORDS, STEPS, Job
 
 if TYPE_CHECKING:
@@ -79,17 +79,17 @@ JOB = Job(
     (*RAIL_WORDS, *CLOUD_WORDS, "raster", "vectorize", "line", "3d"),
     CLOUD_NEEDS,
     (
-        shared.RASTER,
+        inputs.RASTER,
         replace(
-            shared.CLOUD,
+            inputs.CLOUD,
             name="POINTS",
             help="The cloud from which the raster was made: it moves the lines onto the railheads and gives them "
             "heights.",
             optional=True,
         ),
-        *shared.LINES,
-        *shared.RASTER_RAIL,
-        shared.LEFT_OUT,
+        *methods.LINES,
+        *inputs.RASTER_RAIL,
+        inputs.LEFT_OUT,
     ),
     (replace(outputs.RAILS_OUTPUT, name="OUTPUT", optional=False),),
     outputs.RAIL_FIGURES,

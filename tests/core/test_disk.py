@@ -1,4 +1,4 @@
-"""Temporary folders: exclusive, private, and removed by the next run if and only if their process is gone."""
+"""Files of a run are complete or absent, and temporary folders are private and removed when their process is gone."""
 
 import os
 import shutil
