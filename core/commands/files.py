@@ -29,7 +29,7 @@ from ..run.loop import Runner
 from ..run.processes import workers
 
 if TYPE_CHECKING:
-    from ..jobs.features import Source
+    from ..jobs.features import FeatureSource
     from ..jobs.result import Rasters
 
 Spell = Callable[[Parameter], str]
@@ -137,7 +137,7 @@ class FileValues(Values):
         """Return the places of SEED, which are in the coordinate system of the cloud."""
         return [np.array([place]) for place in self["SEED"]]
 
-    def source(self, name: str) -> Source:
+    def source(self, name: str) -> FeatureSource:
         """Return a layer of a file."""
         return self.once(name, lambda: vector_module(name).read_features(self[name], name, name == "AXIS"))
 

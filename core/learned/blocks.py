@@ -183,7 +183,7 @@ def centred(place: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class Layer:
+class PointLayer:
     """The points of a layer, those of all blocks behind each other.
 
     Attributes
@@ -204,7 +204,7 @@ class Layer:
     nearest: np.ndarray
 
 
-def build(blocks: Sequence[np.ndarray]) -> list[Layer]:
+def build(blocks: Sequence[np.ndarray]) -> list[PointLayer]:
     """Find the neighbours of the points of blocks, (n, 3) each, on all layers."""
     layers = []
     for _ in range(LAYERS):
@@ -212,7 +212,7 @@ def build(blocks: Sequence[np.ndarray]) -> list[Layer]:
         starts = np.cumsum([0, *(len(part.position) for part in parts)])
         next_starts = np.cumsum([0, *(len(part.kept) for part in parts)])
         layers.append(
-            Layer(
+            PointLayer(
                 np.concatenate([part.position for part in parts]),
                 np.concatenate([part.near + start for part, start in zip(parts, starts)]),
                 np.concatenate([part.kept + start for part, start in zip(parts, starts)]),
@@ -223,14 +223,14 @@ def build(blocks: Sequence[np.ndarray]) -> list[Layer]:
     return layers
 
 
-def _layer(position: np.ndarray) -> Layer:
+def _layer(position: np.ndarray) -> PointLayer:
     """Find the neighbours within one block."""
     count = len(position)
     near = cKDTree(position).query(position, k=np.arange(1, min(NEIGHBOURS, count) + 1))[1]
     near = np.resize(near.T, (NEIGHBOURS, count)).T if count < NEIGHBOURS else near
     kept = np.arange(-(-count // RATIO))
     nearest = cKDTree(position[kept]).query(position)[1]
-    return Layer(position, near.astype(np.int64), kept, nearest.astype(np.int64))
+    return PointLayer(position, near.astype(np.int64), kept, nearest.astype(np.int64))
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ from ..polyline import MIN_RING_M, Polyline
 from ..progress import SILENT, Progress
 from ..rails import Centerline, RailLine
 from ..standards import closest_standard, distinct_gauges
-from .chaining import Chain, chain_pairs, runs_on, single_rail_limit
+from .chaining import TrackChain, chain_pairs, runs_on, single_rail_limit
 from .midline import (
     MAX_OFFSET_M,
     PROVISIONAL_STEP_M,
@@ -294,7 +294,7 @@ def _refuse_other_spacing(rails: Sequence[RailLine], parameters: Parameters) -> 
     raise NoTrackError(f"{message}.")
 
 
-def _draw(rails: Sequence[RailLine], chain: Chain, parameters: Parameters) -> Centerline | None:
+def _draw(rails: Sequence[RailLine], chain: TrackChain, parameters: Parameters) -> Centerline | None:
     """Draw the centerline of one track; None if its rails are nowhere opposite each other."""
     spacing_m = parameters.gauge_m + parameters.head_width_m
     reach_m, tolerance_m = single_rail_limit(parameters.max_gap_m), parameters.centerline_tolerance_m

@@ -12,7 +12,7 @@ from rail_extract.core.errors import Cancelled, ModelError
 from rail_extract.core.frpdf import cleanup
 from rail_extract.core.frpdf import engine as engine_module
 from rail_extract.core.frpdf.cleanup import clean
-from rail_extract.core.frpdf.corridor import Piece, lay_fields
+from rail_extract.core.frpdf.corridor import Rectangle, lay_batches
 from rail_extract.core.frpdf.engine import MAX_PIECE_CELLS, Engine, Step, make_engine
 from rail_extract.core.frpdf.models import MODELS, load_arrays
 from rail_extract.core.pipeline import Parameters
@@ -78,7 +78,9 @@ def quarters(height, width, row, column):
     """Cut a rectangle into four at a row and a column."""
     rows, columns = (0, row, height), (0, column, width)
     return [
-        Piece(rows[i], columns[j], rows[i + 1] - rows[i], columns[j + 1] - columns[j]) for i in (0, 1) for j in (0, 1)
+        Rectangle(rows[i], columns[j], rows[i + 1] - rows[i], columns[j + 1] - columns[j])
+        for i in (0, 1)
+        for j in (0, 1)
     ]
 
 
@@ -123,7 +125,7 @@ def test_a_cancel_is_noticed_between_pieces(arrays, name):
 @pytest.mark.parametrize("name", ["TORCH", "OPENCV"])
 def test_threads_that_share_the_pieces_change_no_bit(arrays, name, monkeypatch):
     raster = noise(96, 96)
-    pieces = [Piece(row, column, 24, 24) for row in range(0, 96, 24) for column in range(0, 96, 24)]
+    pieces = [Rectangle(row, column, 24, 24) for row in range(0, 96, 24) for column in range(0, 96, 24)]
     engine, parts, found = engine_of(name, arrays), cut(raster, pieces), []
     for count in (1, 3):
         monkeypatch.setattr(engine_module, "threads", lambda count=count: count)
@@ -235,7 +237,7 @@ def test_fields_with_context_give_the_result_of_one_field(arrays):
     engine, raster = engine_of("TORCH", arrays), line(1000)
     whole = cleanup.clean(raster, engine, passes=1)
     engine.max_cells = 20_000
-    assert len(lay_fields(raster, engine.max_cells)) > 2
+    assert len(lay_batches(raster, engine.max_cells)) > 2
     parts = cleanup.clean(raster, engine, passes=1)
     assert whole.count() > 1000
     np.testing.assert_array_equal(parts.cells(), whole.cells())

@@ -11,7 +11,7 @@ from rail_extract.core.grow import growth as many_seeds
 from rail_extract.core.grow.growth import Reason
 from rail_extract.core.grow.heads import GrowSettings
 from rail_extract.core.grow.start import find_start
-from rail_extract.core.labelling.files import Choice, plan_output
+from rail_extract.core.labelling.files import Content, plan_output
 from rail_extract.core.labelling.growing import grow_files
 from rail_extract.core.parameters import GrowParameters
 from rail_extract.core.progress import Progress, Recording
@@ -21,7 +21,7 @@ from rail_extract.laboratory.scenes.raw_strips import GAUGE_M, SPACING_M, WIDTH_
 
 CORNER = np.array([500_003.0, 5_000_008.0, 100.0])
 TRACK = strip(24.0)
-TEN = Choice(10, reset=False)
+TEN = Content(10, reset=False)
 SEED = CORNER[:2] + TRACK.at(12.0, SPACING_M / 2)
 
 
@@ -135,7 +135,7 @@ def test_places_of_a_line_outside_of_the_cloud_are_not_looked_at(tmp_path, monke
 
 def test_only_rails_are_written_on_request(tmp_path):
     source = save(tmp_path / "raw.las", TRACK.xyz)
-    result, _ = grow(tmp_path, [source], tmp_path / "new.las", [SEED], Choice(20, only_rails=True, reset=False))
+    result, _ = grow(tmp_path, [source], tmp_path / "new.las", [SEED], Content(20, only_rails=True, reset=False))
     cloud = laspy.read(result.file)
     assert len(cloud.points) == result.figures.points
     assert np.all(cloud.classification == 20)
