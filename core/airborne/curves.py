@@ -12,7 +12,7 @@ import numpy as np
 from scipy.sparse import block_diag, csr_matrix, diags, vstack
 
 from ..polyline import Polyline, cross
-from .cross_sections import STATION_M, Sections
+from .ridges import STATION_M, Sections
 from .search import parallel
 
 LITTLE = 1e-12
@@ -108,7 +108,7 @@ def differences(count: int, order: int) -> csr_matrix:
 
 
 @dataclass(frozen=True)
-class Curve:
+class TrackCurve:
     """The curve of a track at the middles of its sections, `xy` (n, 2).
 
     `sigma`, (n,), is the standard error across, and `beside`, (n,), the distance of the section's own middle from the
@@ -120,7 +120,7 @@ class Curve:
     beside: np.ndarray
 
 
-def draw_together(lines: Sequence[Polyline], found: Sequence[Sections]) -> list[Curve]:
+def draw_together(lines: Sequence[Polyline], found: Sequence[Sections]) -> list[TrackCurve]:
     """Draw the curves of tracks through their sections, which are seen on `lines`.
 
     How much curvature and distance change is measured along the tracks (expectation maximisation of the variance of the
@@ -143,7 +143,9 @@ def draw_together(lines: Sequence[Polyline], found: Sequence[Sections]) -> list[
         turn_m = stiff.measured(curve.bend)
     error, good = np.sqrt(curve.variance), shows & (robust > TRUSTED)
     parts = np.split(np.arange(len(target)), np.cumsum([len(t) for t in stations])[:-1])
-    return [Curve(curve.values[at], error[at] * _spread((beside / sigma)[at][good[at]]), beside[at]) for at in parts]
+    return [
+        TrackCurve(curve.values[at], error[at] * _spread((beside / sigma)[at][good[at]]), beside[at]) for at in parts
+    ]
 
 
 def _spread(residual: np.ndarray) -> float:

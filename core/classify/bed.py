@@ -58,16 +58,9 @@ BORDER = 1e-6
 class Coarse:
     """The grid of coarse cells that holds the points of a square.
 
-    Attributes
-    ----------
-    column, row : int
-        Of its south-western cell; cell (0, 0) has its south-western corner at the square's.
-    shape : tuple of int
-        Rows and columns.
-    cell : (n,) int32 array
-        Cell of each point.
-    count : (rows * columns,) int array
-        Points of each cell.
+    Cell (0, 0) has its south-western corner at the square's; `column` and `row` are those of the grid's south-western
+    cell, and the shape is rows and columns. `cell`, (n,), is that of each point, and `count` the number of points of
+    each cell.
     """
 
     column: int
@@ -108,7 +101,6 @@ class Bed:
 
     Attributes
     ----------
-    coarse : Coarse
     planes : (MAX_LEVELS, 3, cells) float32 array
         Height in the middle of the cell and slopes to the east and north; NaN where there is no such level.
     """
@@ -122,7 +114,6 @@ class Bed:
 
         Returns
         -------
-        Bed
         height : (n,) float32 array
             Of each point above the bed; see `heights`.
         z : (n,) float32 array
@@ -178,7 +169,6 @@ def find_bed(coarse: Coarse, dx: np.ndarray, dy: np.ndarray, z: np.ndarray) -> B
 
     Parameters
     ----------
-    coarse : Coarse
     dx, dy, z : (n,) arrays
         See `Bed.heights`.
     """

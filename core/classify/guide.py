@@ -99,7 +99,6 @@ class Guide:
 
         Parameters
         ----------
-        lines : Lines
         pairs : (m, 2) int array
             Cells that continue each other.
         spacings_m : sequence of float

@@ -63,15 +63,7 @@ CHUNK = 4000
 
 @dataclass(frozen=True)
 class Marks:
-    """Cells that may belong to lines.
-
-    Attributes
-    ----------
-    xy : (n, 2) array
-        Local metres.
-    height : (n,) array
-        Above the bed.
-    """
+    """Cells that may belong to lines: `xy`, (n, 2) local metres, and height above the bed, (n,)."""
 
     xy: np.ndarray
     height: np.ndarray
@@ -93,7 +85,6 @@ class Lines:
         Share of the parts of the line within reach that hold a cell.
     pure : (n,) array
         Share of the cells on the line among those on it and beside it: 0.07 to 0.12 in random surroundings.
-    reach_m : float
     """
 
     axis: np.ndarray
@@ -149,7 +140,6 @@ def find_lines(
 
     Parameters
     ----------
-    marks : Marks
     reach_m : float
         Distance within which cells are compared.
     along_m : float
@@ -174,14 +164,7 @@ def _neighbours(
 ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
     """Yield wanted cells, chunk by chunk, with their neighbours of the same height.
 
-    Yields
-    ------
-    chosen : (k,) int array
-        Cells.
-    number : (m,) int array
-        Number of the cell in `chosen`.
-    step : (m, 2) array
-        From the cell to its neighbour.
+    A chunk is the cells, (k,), and, (m,) each, a cell's number in them and the step, (m, 2), from it to its neighbour.
     """
     if len(marks.xy) < 2 or not len(wanted):
         return
@@ -260,7 +243,6 @@ def centred(lines: Lines, cells: Marks, half_m: float, along_m: float) -> Lines:
 
     Parameters
     ----------
-    lines : Lines
     cells : Marks
         All narrow cells.
     half_m : float

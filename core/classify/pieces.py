@@ -96,7 +96,6 @@ def long_enough(
 
     Parameters
     ----------
-    lines : Lines
     pairs : (m, 2) int array
         See `links`.
     paired : (n,) bool array
@@ -132,11 +131,7 @@ def _reaches(xy: np.ndarray, piece: np.ndarray, least_m: float, open_ended: np.n
 def shares_of_length(lines: Lines, half_m: float) -> np.ndarray:
     """Length of rail that each cell stands for, (n,) metres: half the way to the next cell ahead and behind.
 
-    Parameters
-    ----------
-    lines : Lines
-    half_m : float
-        Distance across within which two cells are on one line.
+    Two cells within `half_m` across are on one line.
     """
     count = len(lines.axis)
     if count < 2:
@@ -160,8 +155,6 @@ def stands_free(tops: Tops, band: Band, marks: np.ndarray, lines: Lines) -> np.n
 
     Parameters
     ----------
-    tops : Tops
-    band : Band
     marks : (n,) int array
         Cells.
     lines : Lines

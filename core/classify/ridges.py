@@ -122,7 +122,6 @@ def on_crests(xy: np.ndarray, height: np.ndarray, lines: Lines, blur_m: float) -
     ----------
     xy, height : (n, 2) and (n,) arrays
         Of the points; height above the bed.
-    lines : Lines
     blur_m : float
         Standard deviation of the ridges.
     """

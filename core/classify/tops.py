@@ -66,7 +66,6 @@ class Grid:
 
     Attributes
     ----------
-    cell_m : float
     row, column : int
         Cell of the raster at the window's north-western corner.
     shape : tuple of int
@@ -111,7 +110,6 @@ class Tops:
 
     Attributes
     ----------
-    grid : Grid
     top : (rows, columns) int16 array
         Millimetres above the bed of the highest point up to `TOP_M`; `EMPTY` without any.
     z : (rows, columns) float32 array
@@ -133,7 +131,6 @@ def tops_of(grid: Grid, cell: np.ndarray, height: np.ndarray, z: np.ndarray) -> 
 
     Parameters
     ----------
-    grid : Grid
     cell : (n,) int array
         Cell of each point.
     height : (n,) array
@@ -185,7 +182,6 @@ class Window:
 
     Attributes
     ----------
-    grid : Grid
     cell : (k,) int array
         Middle cells.
     reach : int
@@ -239,8 +235,6 @@ def middles_of_tops(
 
     Parameters
     ----------
-    tops : Tops
-    band : Band
     cells : (k,) int array
         In rising order.
     xy, cell, height : (n, 2), (n,) and (n,) arrays

@@ -19,14 +19,9 @@ are valid (n,) bool, as in `Points`, and whether the file is read as a whole."""
 
 @dataclass(frozen=True)
 class CloudHeader:
-    """What the header of a file states.
+    """What the header of a file states; the extent is smallest x and y, largest x and y in units of the CRS.
 
-    Attributes
-    ----------
-    extent : tuple of float
-        Smallest x, smallest y, largest x, largest y in units of the CRS.
-    crs_wkt : str or None
-        Coordinate system as WKT 2; None if the file states none that PROJ understands.
+    `crs_wkt` is WKT 2; None if the file states no coordinate system that PROJ understands.
     """
 
     path: Path

@@ -14,10 +14,8 @@ from .header import Extent
 def list_tiles(catalogue: Path) -> tuple[Path, ...]:
     """List the tiles of a virtual point cloud; relative paths count from its folder.
 
-    Raises
-    ------
-    CloudError
-        The file can't be read as a virtual point cloud, names no tiles, or names one that does not exist.
+    Raises CloudError if the file can't be read as a virtual point cloud, names no tiles, or names one that does not
+    exist.
     """
     try:
         items = json.loads(catalogue.read_text(encoding="utf-8-sig"))["features"]
@@ -35,15 +33,7 @@ def list_tiles(catalogue: Path) -> tuple[Path, ...]:
 
 
 def catalogue_text(tiles: Iterable[tuple[str, int, Extent]], crs_wkt: str | None) -> str:
-    """Return the text of a virtual point cloud.
-
-    Parameters
-    ----------
-    tiles : iterable of (href, point count, extent)
-        Path of each from the folder of the catalogue, and smallest x, smallest y, largest x, largest y.
-    crs_wkt : str or None
-        Coordinate system of all tiles.
-    """
+    """Return the text of a virtual point cloud, given href, point count and extent of each tile, and the common CRS."""
     features = [_feature(*tile, crs_wkt) for tile in tiles]
     return json.dumps({"type": "FeatureCollection", "features": features}, indent=1)
 

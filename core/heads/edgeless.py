@@ -60,17 +60,10 @@ Where noise hides the crest, the mean says more."""
 
 @dataclass(frozen=True)
 class Flank:
-    """A head that shows one face.
+    """A head that shows one face: offset of the axis to the left of the line, and top above the level of the points.
 
-    Attributes
-    ----------
-    left_m : float
-        Offset of the axis to the left of the line.
-    top_m : float
-        Height of the top above the level of the points.
-    sigma_m : float
-        Standard error of the axis; half a head where the points may be on either face. The axis is then
-        stated to be on them.
+    `sigma_m` is the standard error of the axis; half a head where the points may be on either face, and the axis is
+    then stated to be on them.
     """
 
     left_m: float
@@ -112,17 +105,11 @@ def find_flank(points: HeadPoints) -> Flank | None:
 
 @dataclass(frozen=True)
 class Ridge:
-    """The crest of a blunt head along its line.
+    """The crest of a blunt head along its line, at equidistant chainages as in `HeadPoints.stations`, (s,) each.
 
-    Attributes
-    ----------
-    t : (s,) array
-        Equidistant chainages, see `HeadPoints.stations`.
-    offset_m, information : (s,) arrays
-        Offset of the crest to the left of the line that the points next to a station alone show, and the inverse of its
-        variance by the noise of single points, 1/m²; 0 where no points are near.
-    common_m : (s,) array
-        Standard error of the crest that more points would not reduce.
+    `offset_m` is the offset of the crest to the left of the line that the points next to a station alone show, and
+    `information` the inverse of its variance by the noise of single points, 1/m², 0 where no points are near.
+    `common_m` is the standard error that more points would not reduce.
     """
 
     t: np.ndarray

@@ -48,22 +48,11 @@ EDGE_ROUNDS = 2
 
 
 def edge_middles(points: HeadPoints, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Find the middle between the edges of a head at its stations.
+    """Find the middle between the edges of a head at its stations; `free`, (2, s), says where either can be seen.
 
-    The densities come from the long windows, because the scanner's view of the head changes slowly along the line.
-
-    Parameters
-    ----------
-    points : HeadPoints
-    free : (2, s) bool array
-        Where the right and the left edge can be seen.
-
-    Returns
-    -------
-    offset_m : (s,) array
-        Metres to the left of the line; NaN where no edges are visible.
-    information : (s,) array
-        Inverse of its variance that the points next to a station alone contribute, 1/m².
+    Returns metres to the left of the line, (s,), NaN where no edges are visible, and the inverse of the variance that
+    the points next to a station alone contribute, (s,) 1/m². The densities come from the long windows, because the
+    scanner's view of the head changes slowly along the line.
     """
     (top, noise_m), (counts, wide_counts) = points.top, points.histograms
     bin_m, wide = points.width_m / (2 * HALF_HEAD_BINS), np.maximum(wide_counts.sum(axis=1), 1)
@@ -78,16 +67,9 @@ def edge_middles(points: HeadPoints, free: np.ndarray) -> tuple[np.ndarray, np.n
 def _information(density: np.ndarray, weight: np.ndarray, noise_m: float, blur_m: float) -> np.ndarray:
     """Return the inverse of the variance of the middle between both edges that is due to chance, (s,) 1/m².
 
-    An edge is where the blurred density falls to half. There the density has, like any count, the variance density /
-    (4 √π blur), and it falls by density / (√2π spread) per metre; the spread of the edge comes from blur and noise.
-
-    Parameters
-    ----------
-    density : (2, s) array
-        Points per metre across, just inside the edges.
-    weight : (2, s) array
-        Weights of the edges.
-    noise_m, blur_m : float
+    An edge, of the given weight, (2, s), is where the blurred density, (2, s) points per metre across, falls to half.
+    There the density has, like any count, the variance density / (4 √π blur), and it falls by density / (√2π spread)
+    per metre; the spread of the edge comes from blur and noise.
     """
     spread_m = np.hypot(blur_m, noise_m)
     variance = np.sqrt(np.pi) * spread_m**2 / (2 * blur_m * np.maximum(density, 1e-9))
@@ -98,16 +80,10 @@ def _information(density: np.ndarray, weight: np.ndarray, noise_m: float, blur_m
 class Edges:
     """Right and left edge of the head in s windows.
 
-    Attributes
-    ----------
-    density : (2, s) array
-        Points per bin just inside the edge.
-    weight : (2, s) array
-        0 to 1: the edge that faces the scanner counts fully, while the corner of the other is hardly visible.
-    seen : (s,) bool array
-        Whether the edges that count are visible.
-    inset : (s,) array
-        Correction of a middle found from one edge alone, in bins to the left: the round corner hides part of the head.
+    `density`, (2, s), is in points per bin just inside the edge. `weight`, (2, s), is 0 to 1: the edge that faces the
+    scanner counts fully, while the corner of the other is hardly visible; `seen`, (s,), holds where the edges that
+    count are visible. `inset`, (s,), corrects a middle found from one edge alone, in bins to the left: the round corner
+    hides part of the head.
     """
 
     density: np.ndarray

@@ -12,13 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from ..alignment.deviations import Deviations
 from ..alignment.elements import Alignment, CantElement, Element, PlanElement, VerticalElement
+from ..alignment.measured import Deviations
 from ..alignment.stations import StationRange, stations_of
 from ..checks.findings import largest, rms
 from ..progress import metres
 from .markup import figure, legend, made, page, section, table, tag, text, tiles
-from .origin import stated
+from .page import stated
 from .plots import LEFT, SPACE, TICKS_ACROSS, WIDTH, Curve, Frame, Panel, across, bottom_of, broken, round_up
 
 PROPOSAL = (

@@ -11,10 +11,9 @@ from scipy.special import erf
 
 from ...core.alignment.elements import Alignment, Element, PlanElement, VerticalElement
 from ...core.alignment.fit import fit_track
-from ...core.alignment.held import given_of, noted
-from ...core.alignment.layouts import plan_errors
+from ...core.alignment.layouts import given_of, noted, plan_errors
 from ...core.alignment.noise import Noise
-from ...core.alignment.plane_fit import Points, fit_plan
+from ...core.alignment.plane_fit import MeasuredLine, fit_plan
 from ...core.errors import ParameterError
 from ...core.polyline import Polyline
 from ...core.progress import SILENT, Recording
@@ -91,7 +90,7 @@ def bound_of(design: Alignment, line: np.ndarray, white_m: float) -> Bound:
     """
     s = Polyline(line).t
     given = given_of(replace(design, plan=tuple(map(noted, design.plan))), 0.0, float(s[-1]))
-    points = Points(line[:, :2], s, np.full(len(s), 1.0 / white_m**2))
+    points = MeasuredLine(line[:, :2], s, np.full(len(s), 1.0 / white_m**2))
     fit = fit_plan(given.chain, points, given.held, poses=given.poses)
     errors = plan_errors(fit, points, white_m, Noise(white_m))
     arcs = np.array([one.type == "arc" for one in fit.elements])

@@ -26,7 +26,7 @@ from qgis.core import (
 from ...core.clouds.crs import unit_in_plan
 from ...core.errors import CrsError, ParameterError
 from ...core.jobs.declaration import LINE, POINT, POLYGON
-from ...core.jobs.features import Feature, Source
+from ...core.jobs.features import Feature, FeatureSource
 from ..systems import system
 
 CHORD_TOLERANCE_M = 0.0005
@@ -49,7 +49,7 @@ KINDS = {
 }
 
 
-class LayerSource(Source):
+class LayerSource(FeatureSource):
     """A layer that an algorithm was given for the parameter of this name."""
 
     def __init__(self, name: str, source: QgsProcessingFeatureSource, context: QgsProcessingContext) -> None:

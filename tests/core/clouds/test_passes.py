@@ -5,7 +5,7 @@ import pytest
 from rail_extract.core.clouds.passes import marks_of, number_passes
 from rail_extract.core.clouds.points import ask, read_rail_points
 from rail_extract.core.tiles.grid import Square
-from rail_extract.core.tiles.spool import spool
+from rail_extract.core.tiles.store import spool
 from rail_extract.laboratory.scenes.las import write_las
 
 SPEED, START = 12.0, 3.2e8

@@ -8,17 +8,17 @@ from rail_extract.core.classify.settings import Settings
 from rail_extract.core.clouds.las import laspy
 from rail_extract.core.clouds.points import ask
 from rail_extract.core.clouds.vpc import list_tiles
+from rail_extract.core.disk import scratch_folder
 from rail_extract.core.errors import CloudError, DiskError, RailExtractError
-from rail_extract.core.labelling.files import Choice, classify_files, plan_output
+from rail_extract.core.labelling.files import Content, classify_files, plan_output
 from rail_extract.core.progress import Progress, Recording
 from rail_extract.core.run.loop import Answer, InTurn, Runner
-from rail_extract.core.scratch import scratch_folder
 from rail_extract.core.standards import SEARCHED_CLASSES
 from rail_extract.laboratory.scenes.raw_shapes import flat, rough, with_track
 
 GAUGE, WIDTH = 1.435, 0.072
 SETTINGS = Settings((GAUGE,), WIDTH)
-TEN = Choice(10)
+TEN = Content(10)
 CORNER = np.array([500_000.0, 5_000_000.0, 100.0])
 
 
@@ -116,10 +116,10 @@ def test_the_rail_class_is_reset_or_kept_and_other_points_are_left_out(tmp_path,
     source = save(tmp_path / "raw.las", xyz, codes=codes)
     counts = {}
     for name, choice in {
-        "reset": Choice(11),
-        "kept": Choice(10, reset=False),
+        "reset": Content(11),
+        "kept": Content(10, reset=False),
         "ten": TEN,
-        "only": Choice(12, only_rails=True),
+        "only": Content(12, only_rails=True),
     }.items():
         result, _ = classify(tmp_path, [source], tmp_path / f"{name}.las", choice)
         counts[name] = np.bincount(laspy.read(result.file).classification, minlength=20), result.figures.points
@@ -248,7 +248,7 @@ def test_of_two_runs_onto_one_output_the_later_one_says_so_and_changes_nothing(t
     run(TEN, first)
     written = content()
     with pytest.raises(DiskError, match="was changed by another program in the meantime"):
-        run(Choice(11), second)
+        run(Content(11), second)
     assert content() == written
     assert [path.name for path in tmp_path.glob("*_new*")] == (["new_new.las"] if count == 1 else [])
 
