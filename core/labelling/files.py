@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from ..classify.settings import Settings
+from ..clouds.header import catalogue_text
 from ..clouds.points import Request
 from ..clouds.readers import CATALOGUE, SUFFIXES, list_files
 from ..clouds.rewriting import Places, check_class, rewrite
-from ..clouds.vpc import catalogue_text
 from ..disk import NEW, Destination, alone_in, identity, replace_folder, scratch_folder, writing
 from ..errors import DiskError, ParameterError, RailExtractError
 from ..grow.growth import Stop
