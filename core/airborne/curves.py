@@ -12,7 +12,7 @@ import numpy as np
 from scipy.sparse import block_diag, csr_matrix, diags, vstack
 
 from ..polyline import Polyline, cross
-from .ridges import STATION_M, Sections
+from .ridges import OUTLIER, STATION_M, Sections
 from .search import parallel
 
 LITTLE = 1e-12
@@ -40,9 +40,6 @@ third differences of 0.056 m, the toe of a switch 0.3 m; its tracks part with se
 
 CURVE_PASSES = 12
 """Weightings of the curve, after which it hardly moves."""
-
-OUTLIER = 3.0
-"""Residual, in standard errors, at which a section has lost 3/4 of its weight."""
 
 TRUSTED = 0.2
 """Least weight of the sections whose residuals judge the standard errors."""

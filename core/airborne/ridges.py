@@ -40,7 +40,7 @@ EDGE_INSIDE_M = 0.15
 """Distance inside of the rail at which such an edge begins."""
 
 OUTLIER = 3.0
-"""Residual, in standard deviations, at which a bin has lost half of its weight."""
+"""Residual, in standard deviations, at which a bin, or a section of a curve, has lost 3/4 of its weight."""
 
 FLAT_LOSS = 0.45
 """Loss per bin of a bed that is flat but for noise; what is beyond counts against a place."""

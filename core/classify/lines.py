@@ -136,18 +136,9 @@ def joined(one: Lines, other: Lines) -> Lines:
 def find_lines(
     marks: Marks, reach_m: float, along_m: float, beside_line_m: float, wanted: np.ndarray | None = None
 ) -> Lines:
-    """Find the line through each cell.
+    """Find the line through each cell, compared with those within `reach_m`; with `wanted`, others get no cover.
 
-    Parameters
-    ----------
-    reach_m : float
-        Distance within which cells are compared.
-    along_m : float
-        Largest difference in height between neighbours on a line.
-    beside_line_m : float
-        Largest distance across from the line.
-    wanted : (k,) int array, optional
-        Cells whose lines are needed; the others get no cover.
+    Neighbours on a line differ by at most `along_m` in height, and are at most `beside_line_m` across from it.
     """
     count = len(marks.xy)
     wanted = np.arange(count) if wanted is None else wanted
@@ -239,16 +230,10 @@ def _measured(
 
 
 def centred(lines: Lines, cells: Marks, half_m: float, along_m: float) -> Lines:
-    """Move the axes to the middle of all cells of their heads: those that were thinned are to one side or the other.
+    """Move axes to the middle of all narrow cells of their heads: those that were thinned are to one side or the other.
 
-    Parameters
-    ----------
-    cells : Marks
-        All narrow cells.
-    half_m : float
-        Largest distance of a cell's top from the axis of its head: half the head and noise, short of a guard rail.
-    along_m : float
-        Largest difference in height.
+    A cell's top is at most `half_m` from the axis of its head, which is half the head and noise, short of a guard rail,
+    and at most `along_m` from it in height.
     """
     if not len(lines.axis):
         return lines

@@ -57,23 +57,11 @@ def have_partners(lines: Lines, spacings_m: Sequence[float], height_m: float) ->
 def partners(
     lines: Lines, spacing_m: float, tolerance_m: float, height_m: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Find the partners of each cell's line on the better side.
+    """Find the partners of each cell's line on the better side: `spacing_m` away, give or take `tolerance_m`.
 
-    Parameters
-    ----------
-    spacing_m, tolerance_m : float
-        Distance of the two lines, and its largest deviation.
-    height_m : float
-        Largest difference in height above the bed.
-
-    Returns
-    -------
-    stations : (n,) int array
-        Stations with a partner, 0 to 5.
-    side : (n,) int array
-        1: the partner is to the left; -1: to the right.
-    apart_m : (n,) array
-        Mean distance of the partner; NaN without one.
+    They differ by at most `height_m` in height above the bed. Returns, (n,) each, the number of stations with a
+    partner, 0 to 5, the side, 1 if the partner is to the left and -1 to the right, and its mean distance, NaN without
+    one.
     """
     count = len(lines.axis)
     if count < 2:

@@ -46,23 +46,11 @@ def _slots(gps_time: np.ndarray | None, count: int) -> np.ndarray:
 
 
 def number_passes(marks: np.ndarray, places: np.ndarray) -> dict[int, int]:
-    """Find the passes of a cloud and number them.
+    """Find the passes of a cloud and number them, below 2¹⁶, by mark, as of `marks_of`.
 
     A pass of one source id goes on from slot to slot, and ends where time is missing or where it comes back to a place
     that it has left. Where every source id is one pass, its number is the id; else passes are numbered in the order of
-    their times.
-
-    Parameters
-    ----------
-    marks : (m,) uint32 array
-        See `marks_of`.
-    places : (m, 2) int array
-        Squares some tens of metres wide that hold points with these marks.
-
-    Returns
-    -------
-    dict of int to int
-        Number of the pass of each mark, below 2¹⁶.
+    their times. `places`, (m, 2), are squares some tens of metres wide that hold points with these marks.
 
     Examples
     --------

@@ -39,18 +39,11 @@ AIRBORNE_SIDE_M, AIRBORNE_DENSITY = 20.0, (0.5, 60.0)
 
 @dataclass(frozen=True)
 class RailPoints:
-    """The points of one class.
+    """The points of one class, `xyz` (n, 3) local metres.
 
-    Attributes
-    ----------
-    xyz : (n, 3) array
-        Local metres.
-    strips : (n,) array or None
-        Number of the strip, a pass of the scanner, that each point belongs to; None if all points are of one strip.
-    found : bool
-        Whether they were found in a raw cloud, and not by their class: in a blunt one they are whole ridges.
-    blunt : bool or None
-        Whether the cloud blunts heads, as its lines have shown; None before there are any.
+    `strips`, (n,), has the number of the strip, a pass of the scanner, that each point belongs to; None if all points
+    are of one strip. If `found`, they are from a raw cloud, and not by their class: in a blunt one they are whole
+    ridges. `blunt` says whether the cloud blunts heads, as its lines have shown; None before there are any.
     """
 
     xyz: np.ndarray

@@ -13,8 +13,7 @@ import numpy as np
 
 from ..errors import Cancelled, CloudError, EmptyCloudError, RailExtractError
 from ..progress import SILENT, Progress
-from .header import CloudHeader, Extent
-from .vpc import list_tiles
+from .header import CloudHeader, Extent, list_tiles
 
 SUFFIXES = (".las", ".laz")
 """Suffixes of files that are read. COPC files end in .copc.laz."""

@@ -12,8 +12,7 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d
 
 from ..rails import Support
-from .edgeless import FLANK_TOP_SIGMA_M, Flank, Ridge, find_flank
-from .edges import EDGE_SIGMA_M, VIEW_STATIONS, edge_middles
+from .edges import EDGE_SIGMA_M, FLANK_TOP_SIGMA_M, VIEW_STATIONS, Flank, Ridge, edge_middles, find_flank
 from .head_points import MIN_ON_HEAD, STATION_STEP_M, HeadPoints
 from .level import robust_sigma
 from .roads import MIN_WIDER_M, bands, hidden_edges

@@ -174,13 +174,9 @@ def _bins(first: float, last: float) -> np.ndarray:
 class Section:
     """The head in one section of a line.
 
-    Attributes
-    ----------
-    place : (7,) array
-        Offset of the axis to the left, height of the top, slope across, excess of the head width, the logarithms of the
-        noise across and in height, and the excess of the bend of the crown, 1/m; lengths in metres.
-    shares : (k + 1,) array
-        Share of the points of each part, and of those on none.
+    `place`, (7,), has the offset of the axis to the left, height of the top, slope across, excess of the head width,
+    the logarithms of the noise across and in height, and the excess of the bend of the crown, 1/m; lengths in metres.
+    `shares`, (k + 1,), are the shares of the points of each part, and of those on none.
     """
 
     place: np.ndarray
@@ -189,18 +185,11 @@ class Section:
 
 @dataclass(frozen=True)
 class Blurred:
-    """An outline at a place, blurred by noise.
+    """An outline at a place, blurred by noise across and in height, (2,) metres.
 
-    Attributes
-    ----------
-    across, height : (x, j), (j, y) arrays
-        Densities of each sample in the bins across and in height.
-    off, above : (x, j), (j, y) arrays
-        Distance of the bins from each sample in standard deviations of the noise.
-    noise : (2,) array
-        Across and in height, metres.
-    parts : (k + 1, b) array
-        Density of each part by bin, and of strays.
+    `across`, (x, j), and `height`, (j, y), are the densities of each sample in the bins; `off` and `above`, of the same
+    shapes, are the distances of the bins from each sample in standard deviations of the noise. `parts`, (k + 1, b), is
+    the density of each part by bin, and of strays.
     """
 
     outline: Outline

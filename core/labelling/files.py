@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from ..classify.settings import Settings
+from ..clouds.header import catalogue_text
 from ..clouds.points import Request
 from ..clouds.readers import CATALOGUE, SUFFIXES, list_files
 from ..clouds.rewriting import Places, check_class, rewrite
-from ..clouds.vpc import catalogue_text
 from ..disk import NEW, Destination, alone_in, identity, replace_folder, scratch_folder, writing
 from ..errors import DiskError, ParameterError, RailExtractError
 from ..grow.growth import Stop
@@ -120,25 +120,11 @@ def classify_files(
     runner: Runner,
     progress: Progress = SILENT,
 ) -> ClassifiedFiles:
-    """Find the rail points of a cloud and write its files with their classes.
+    """Find the rail points of a cloud, in `standards.SEARCHED_CLASSES`, and write its files with their classes.
 
-    Parameters
-    ----------
-    request : Request
-        Files, `standards.SEARCHED_CLASSES` classes and extent.
-    output : Output
-        From `plan_output`, for the files of the request.
-    folder : Path
-        Existing folder for temporary files, 42 bytes per point; the caller removes it.
-    runner : Runner
-        Its results are complete, or there is no output.
-
-    Raises
-    ------
-    CloudError, NoRailPointsError, DiskError
-        See `finding.find_rail_points`; `DiskError` also if another program has changed an output.
-    RailExtractError
-        A square could not be searched.
+    `output` is from `plan_output`, for the files of the request. The caller removes the folder, which gets 42 bytes per
+    point. Results of the runner are complete, or there is no output. Raises DiskError also if another program has
+    changed an output, and RailExtractError if a square could not be searched.
     """
     finding, rewriting = progress.divide((2.0, 1.0))
     labels = Labels(request, folder)

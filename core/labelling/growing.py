@@ -51,21 +51,10 @@ def grow_files(
 ) -> ClassifiedFiles:
     """Follow rails from seeds and write the files of a cloud with the classes of their points.
 
-    Parameters
-    ----------
-    request : Request
-        Files, `standards.SEARCHED_CLASSES` classes and extent.
-    seeds : sequence of (k, 2) array
-        Places on railheads, k = 1, or lines along them, in units of the CRS.
-    output : Output
-        From `files.plan_output`, for the files of the request.
-    folder : Path
-        Existing folder for temporary files, 36 bytes per point within reach; the caller removes it.
-
-    Raises
-    ------
-    OffCloudError, OffRailError
-        No seed is in the cloud, or on a rail.
+    Seeds, (k, 2) in units of the CRS, are places on railheads, k = 1, or lines along them; the request has
+    `standards.SEARCHED_CLASSES`. `output` is from `files.plan_output`, for the files of the request. The caller removes
+    the folder, which gets 36 bytes per point within reach. Raises OffCloudError or OffRailError if no seed is in the
+    cloud, or on a rail.
     """
     growing, rewriting = progress.divide((7.0, 3.0))
     labels = Labels(request, folder)

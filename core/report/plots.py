@@ -41,7 +41,7 @@ STRIP_SPAN_MM = 10.0
 """Smallest range of a panel of strips, so that noise does not look alarming."""
 
 STEP_M = 1.5
-"""Stations of strips further apart belong to different parts of a course: there is one for every metre."""
+"""Places further apart belong to different parts of a track: there is one for every metre."""
 
 
 @dataclass(frozen=True)

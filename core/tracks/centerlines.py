@@ -15,7 +15,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..errors import NoTrackError
-from ..lines.ends import ARC, STRAIGHT, PartingLaw, left_of
+from ..lines.ends import ARC, ROUNDS, STRAIGHT, PartingLaw, left_of
 from ..lines.finishing import finished, united
 from ..lines.smoothing import STATIONS_PER_SIGMA, smooth_line
 from ..parameters import Parameters
@@ -60,9 +60,6 @@ BENT_M = 0.0025
 
 HEEL_STEP_M = 0.5
 """Step in which the end of a straight switch is searched; straight switches are 3 to 12 m long."""
-
-ROUNDS = 5
-"""Rounds of reweighting."""
 
 MAX_BACK_M = 40.0
 """Largest extension: a branch of 2500 m radius, the widest in use, is 0.3 m from the through track after 39 m."""

@@ -8,8 +8,8 @@ from heard import Heard
 from rail_extract.core.airborne import files
 from rail_extract.core.airborne.files import Run, survey_files
 from rail_extract.core.airborne.survey import FLIGHT, GuideLine
+from rail_extract.core.clouds.header import catalogue_text
 from rail_extract.core.clouds.points import ask
-from rail_extract.core.clouds.vpc import catalogue_text
 from rail_extract.core.errors import CloudError, NoRailPointsError, ParameterError
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.parameters import AirborneParameters

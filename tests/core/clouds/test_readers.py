@@ -37,7 +37,7 @@ def test_a_catalogue_may_begin_with_a_byte_order_mark(tmp_path):
 def test_a_tile_that_a_catalogue_repeats_is_looked_up_once(tmp_path, monkeypatch):
     write_cloud(tmp_path / "a.las")
     looked_up, exists = [], os.path.exists
-    monkeypatch.setattr("rail_extract.core.clouds.vpc.os.path.exists", lambda p: looked_up.append(p) or exists(p))
+    monkeypatch.setattr("rail_extract.core.clouds.header.os.path.exists", lambda p: looked_up.append(p) or exists(p))
     assert readers.list_files(write_catalogue(tmp_path / "all.vpc", *["a.las"] * 1000)) == (tmp_path / "a.las",)
     assert looked_up.count(tmp_path / "a.las") == 1
 

@@ -5,9 +5,9 @@ import sys
 import numpy as np
 import pytest
 from rail_extract.core.classify.settings import Settings
+from rail_extract.core.clouds.header import list_tiles
 from rail_extract.core.clouds.las import laspy
 from rail_extract.core.clouds.points import ask
-from rail_extract.core.clouds.vpc import list_tiles
 from rail_extract.core.disk import scratch_folder
 from rail_extract.core.errors import CloudError, DiskError, RailExtractError
 from rail_extract.core.labelling.files import Content, classify_files, plan_output

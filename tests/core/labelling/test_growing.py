@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 from heard import Heard
+from rail_extract.core.clouds.header import list_tiles
 from rail_extract.core.clouds.las import laspy
 from rail_extract.core.clouds.points import ask
-from rail_extract.core.clouds.vpc import list_tiles
 from rail_extract.core.disk import scratch_folder
 from rail_extract.core.grow import growth as many_seeds
 from rail_extract.core.grow.growth import Reason
