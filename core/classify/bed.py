@@ -107,7 +107,10 @@ class Bed:
 
     @classmethod
     def under(cls, xyz: np.ndarray) -> tuple[Bed, np.ndarray, np.ndarray]:
-        """Find the bed under points, (n, 3) metres, and their heights, (n,), above it and from a multiple of `ORIGIN_STEP` on."""
+        """Find the bed under points, (n, 3) metres.
+
+        Also returns their heights, (n,), above it and from a multiple of `ORIGIN_STEP` on.
+        """
         x, y = (np.ascontiguousarray(values) for values in xyz.T[:2])
         z = (xyz[:, 2] - ORIGIN_STEP * np.floor(xyz[:, 2].min() / ORIGIN_STEP)).astype(np.float32)
         coarse = Coarse.around(x, y)

@@ -92,7 +92,7 @@ def long_enough(
     keep_single: bool,
     least_m: float = LEAST_M,
 ) -> np.ndarray:
-    """Return which cells belong to pieces that are kept, (n,) bool: with a partner, if they are at least `least_m` long.
+    """Return which cells belong to pieces that are kept, (n,) bool: with a partner, if they are as long as `least_m`.
 
     Pieces without a partner are kept with `keep_single`. Pieces of cells that are `open_ended`, at the border of what
     the square sees, continue beyond it and are long enough, because they already run through the whole margin.
