@@ -43,12 +43,7 @@ NEAR_M = 0.1
 class Cut:
     """A short section of the sample, with the weights for it.
 
-    Attributes
-    ----------
-    points : RailPoints
-    parameters : Parameters
-        Without thinning, which may keep different vertices of the same curve.
-    arrays : dict
+    Lines are not thinned, which may keep different vertices of the same curve.
     """
 
     points: RailPoints
@@ -73,18 +68,7 @@ def open_vino(
 ) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
     """Return a function that runs the first pass on OpenVINO, with as many threads as PyTorch has.
 
-    Parameters
-    ----------
-    arrays : dict
-        Weights.
-    number_type : {"float32", "bfloat16"}
-    height, width : int
-        Size of the raster.
-
-    Returns
-    -------
-    callable
-        From raster and state to probabilities.
+    It gives probabilities from raster and state, in float32 or bfloat16.
     """
     from openvino import Core
 
@@ -99,15 +83,7 @@ def open_vino(
 
 
 def speed_table(cut: Cut, rounds: int, clock: Callable[[], float]) -> Iterable[str]:
-    """Time the first pass, with the variants in turn, and yield the medians of seconds per megacell.
-
-    Parameters
-    ----------
-    cut : Cut
-    rounds : int
-    clock : callable
-        Returns seconds.
-    """
+    """Time the first pass, with the variants in turn, and yield the medians of seconds per megacell."""
     raster = cut.raster
     (field,) = lay_batches(raster, 1 << 40)
     row, column = raster.cells().min(axis=0)

@@ -228,22 +228,9 @@ def elsewhere(call: Callable[[], set[int] | None]) -> set[int]:
 
 
 def kill_once(name: str, folder: Path, first: int, after_s: float) -> str:
-    """Write versions from `first` on in a process of its own, kill it, and return what is there.
+    """Write versions from `first` on in a process of its own, kill it after a time, and return what is there.
 
-    Parameters
-    ----------
-    name : str
-        Key of `FORMATS`.
-    folder : Path
-        Folder of the file, with the version before `first`.
-    first : int
-    after_s : float
-        Seconds from the first write to the kill.
-
-    Returns
-    -------
-    str
-        "whole", "absent until the next run" or what is wrong.
+    The folder has the version before `first`. What is there is "whole", "absent until the next run" or what is wrong.
     """
     file, write, read = FORMATS[name]
     reader, writer = os.pipe()

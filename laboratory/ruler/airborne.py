@@ -134,12 +134,9 @@ def surveyed(scene: FlownScene) -> AirborneSurvey:
 def survey_figures(scene: FlownScene) -> dict[str, float]:
     """Survey a scene along its guides, and measure the tracks that are found.
 
-    Returns
-    -------
-    dict of str to float
-        Shares of stations in per cent; errors in millimetres, rms across, and sd of the height; `wrong m`: length that
-        is seen where no track is; `others`: tracks without a guide; `said`: warnings; and, by the names of `UNSEEN`,
-        the number of stations that are not seen.
+    Shares of stations are in per cent; errors in millimetres, rms across, and sd of the height; `wrong m` is the length
+    that is seen where no track is, `others` counts tracks without a guide, `said` warnings, and the names of `UNSEEN`
+    stations that are not seen.
     """
     survey = surveyed(scene)
     pairs = list(zip(survey.tracks, scene.meant))

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from heard import Heard
 from rail_extract.core.airborne import files
 from rail_extract.core.airborne.files import Run, survey_files
 from rail_extract.core.airborne.survey import FLIGHT, GuideLine
@@ -12,7 +13,6 @@ from rail_extract.core.clouds.points import ask
 from rail_extract.core.errors import CloudError, NoRailPointsError, ParameterError
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.parameters import AirborneParameters
-from rail_extract.core.progress import Progress
 from rail_extract.core.run.loop import Runner
 from rail_extract.laboratory.airborne.flight import AirborneCloud
 from rail_extract.laboratory.airborne.write import ORIGIN, las_of, write_airborne
@@ -24,23 +24,12 @@ FOOT_M = 1200 / 3937
 PARAMETERS = AirborneParameters(1.435, 0.072, footprint_m=0.25)
 
 
-class Log(Progress):
-    def __init__(self):
-        self.texts, self.warnings = [], []
-
-    def info(self, text):
-        self.texts.append(text)
-
-    def warning(self, text):
-        self.warnings.append(text)
-
-
 def guides(flown, move=(0.0, 0.0)):
     return [GuideLine(number + 1, guide + ORIGIN[:2] + move) for number, guide in enumerate(flown.guides)]
 
 
 def survey(paths, given, folder, parameters=PARAMETERS, codes=(1, 2), progress=None):
-    return survey_files(Run(ask(paths, codes), parameters, folder / "points", Runner(), progress or Log()), given)
+    return survey_files(Run(ask(paths, codes), parameters, folder / "points", Runner(), progress or Heard()), given)
 
 
 def write_tiles(cloud, axis, folder):
@@ -59,16 +48,16 @@ def cloud(flown, tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def whole(flown, cloud):
-    log = Log()
-    return survey(cloud, guides(flown), cloud.parent, progress=log), log
+    heard = Heard()
+    return survey(cloud, guides(flown), cloud.parent, progress=heard), heard
 
 
 def test_the_lines_lie_on_the_tracks(flown, whole):
-    found, log = whole
+    found, heard = whole
     assert [line.guide_id for line in found.lines] == [1, 2]
     assert found.seen_m > 0.95 * found.guides_m
     assert found.density == pytest.approx(10, rel=0.15)
-    assert FLIGHT in log.texts
+    assert FLIGHT in heard.infos
     for line, number in zip(found.lines, (0, 1)):
         truth = flown.design.truth(number)
         places = found.frame.to_crs(line.xyz)[:, :2] - ORIGIN[:2]

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from heard import Heard
 from rail_extract.core.errors import Cancelled, ModelError, ParameterError
 from rail_extract.core.learned.blocks import Examples, save_index, write_square
-from rail_extract.core.progress import Progress
 from rail_extract.laboratory.scenes.raw_shapes import track_beside_kerb
 
 torch = pytest.importorskip("torch")
@@ -27,17 +27,6 @@ def examples(tmp_path_factory):
     tile = (xyz[:, 0] > 20).astype(int)
     save_index(folder, write_square(folder, 0, (0, 0), SIDE, xyz, on, tile))
     return Examples.load(folder)
-
-
-class CancelledAfter(Progress):
-    """Cancels once a number of steps are done."""
-
-    def __init__(self, steps):
-        self.left = steps
-
-    def is_cancelled(self):
-        self.left -= 1
-        return self.left < 0
 
 
 def test_blocks_on_disk_have_their_labels_and_count_all_points(examples):
@@ -82,7 +71,7 @@ def test_an_interrupted_training_gives_the_same_weights(examples, tmp_path):
     twice.mkdir()
     whole = train(examples, TrainingSettings(1), once, "CPU")
     with pytest.raises(Cancelled, match=r"Cancelled at step 2 of \d: the same run continues from .*twice"):
-        train(examples, TrainingSettings(1), twice, "CPU", CancelledAfter(2))
+        train(examples, TrainingSettings(1), twice, "CPU", Heard(cancel_after=2))
     assert (twice / training.CHECKPOINT).exists()
     resumed = train(examples, TrainingSettings(1), twice, "CPU")
     for name, value in whole.network.state_dict().items():
@@ -98,7 +87,7 @@ def test_an_interrupted_training_gives_the_same_weights(examples, tmp_path):
 
 def test_a_full_graphics_card_is_said_in_a_sentence_and_the_checkpoint_stays(examples, tmp_path, monkeypatch):
     with pytest.raises(Cancelled):
-        train(examples, TrainingSettings(1), tmp_path, "CPU", CancelledAfter(1))
+        train(examples, TrainingSettings(1), tmp_path, "CPU", Heard(cancel_after=1))
     kept = (tmp_path / training.CHECKPOINT).read_bytes()
 
     def full(self, features, layers):
