@@ -346,14 +346,8 @@ class TrackGeometry:
 class StripCourse:
     """Offsets of one strip, a pass of the scanner, from the mean of all strips along a track; (n,) arrays.
 
-    Attributes
-    ----------
-    track_id, strip : int
-        Track, and number of the strip.
-    chainage_m : float
-        Plan distance from the start of the centerline of places that another strip shows as well.
-    across_mm, up_mm : float
-        Offset to the left, seen along the centerline, and upwards.
+    `chainage_m` is the plan distance from the start of the centerline of places that another strip shows as well;
+    `across_mm` and `up_mm` are the offsets to the left, seen along the centerline, and upwards.
     """
 
     track_id: int
