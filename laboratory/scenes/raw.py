@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...core.frame import LocalFrame
+from ...core.polyline import Polyline
 from ...core.standards import RailStandard
 from ..curves import Curve
 from .raw_photogrammetry import GROUND_CLASS, Photogrammetry, Surface, misplaced, survey
@@ -156,9 +157,9 @@ def placed(line: Curve, station: np.ndarray, left: np.ndarray, height: np.ndarra
 
 
 def crest(rail: np.ndarray, line: Curve, surface: Surface) -> np.ndarray:
-    """Lay a rail at the height of a surface, (k, 3), as the mean over the distance of two sleepers."""
-    _, chainage, left = along_and_left(line, rail[:, :2])
-    around = chainage + np.linspace(-SLEEPER_STEP_M, SLEEPER_STEP_M, 9)[:, None]
-    around = around.clip(0, line.length_m)
-    height = surface.at(around.ravel(), np.broadcast_to(left, around.shape).ravel()).reshape(around.shape)
+    """Lay a rail at the height of a surface, (k, 3), as the mean over the distance of two sleepers along the rail."""
+    own = Polyline(rail)
+    around = own.t + np.linspace(-SLEEPER_STEP_M, SLEEPER_STEP_M, 9)[:, None]
+    _, station, left = along_and_left(line, own.at(around.ravel())[:, :2])
+    height = surface.at(station.clip(0, line.length_m), left).reshape(around.shape)
     return np.column_stack([rail[:, :2], height.mean(axis=0)])
