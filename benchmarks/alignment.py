@@ -17,7 +17,7 @@ from functools import partial
 import numpy as np
 from rail_extract.core.alignment.elements import Alignment
 from rail_extract.core.alignment.fit import fit_track
-from rail_extract.core.alignment.held import noted
+from rail_extract.core.alignment.layouts import noted
 from rail_extract.core.parameters import FitParameters
 from rail_extract.laboratory.designs import FAMILIES, Family, random_design, surveyed, with_cant
 from rail_extract.laboratory.ruler.alignments import Met, bound_of, compared, quantiles, together

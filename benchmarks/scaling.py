@@ -38,11 +38,11 @@ from rail_extract.core.run.cluster import Cluster, started
 from rail_extract.core.run.loop import Answer, Runner, next_of
 from rail_extract.core.run.tasks import Context, Once, Task
 from rail_extract.core.squares.kept import KeptResults
-from rail_extract.core.squares.pieces import SquareRails, trim
+from rail_extract.core.squares.seams import SquareRails, trim
 from rail_extract.core.squares.steps import engine_for, square_side
 from rail_extract.core.standards import STANDARDS
 from rail_extract.core.tiles.grid import HALO_M, Square
-from rail_extract.core.tiles.spool import SpooledPoints, spool
+from rail_extract.core.tiles.store import SpooledPoints, spool
 from rail_extract.laboratory.curves import Element, trace
 from rail_extract.laboratory.scenes.plain import spacing
 from rail_extract.laboratory.scenes.scanner import Scanner

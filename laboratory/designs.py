@@ -9,7 +9,7 @@ from typing import Optional
 import numpy as np
 
 from ..core.alignment.elements import Alignment, CantElement, VerticalElement, chained
-from ..core.alignment.held import noted
+from ..core.alignment.layouts import noted
 from ..core.alignment.measured import Track
 from ..core.frame import LocalFrame
 from ..core.parameters import CLOTHOIDS, FitParameters

@@ -29,17 +29,16 @@ from osgeo import gdal, ogr
 from qgis.core import QgsApplication, QgsProcessingContext
 from rail_extract.core.clouds.points import ask
 from rail_extract.core.clouds.readers import list_files
-from rail_extract.core.disk import Destination, identity
+from rail_extract.core.disk import MARK, MIN_UNMARKED_AGE_S, PREFIX, Destination, identity
 from rail_extract.core.fields import RAILS
 from rail_extract.core.files.layers import lines_layer
-from rail_extract.core.files.raster_file import header_for
+from rail_extract.core.files.rail_rasters import header_for
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.labelling.files import Choice, Labels, Output, write_labelled
 from rail_extract.core.progress import SILENT
 from rail_extract.core.rails import RailLine
 from rail_extract.core.raster import rasterize
 from rail_extract.core.run.loop import Runner
-from rail_extract.core.scratch import MARK, MIN_UNMARKED_AGE_S, PREFIX
 from rail_extract.core.standards import SEARCHED_CLASSES, resolve
 from rail_extract.rail_extract_plugin.algorithms import ALGORITHMS
 from rail_extract.rail_extract_plugin.dialog.parameter_values import ParameterValues

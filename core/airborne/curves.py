@@ -12,7 +12,7 @@ import numpy as np
 from scipy.sparse import block_diag, csr_matrix, diags, vstack
 
 from ..polyline import Polyline, cross
-from .cross_sections import STATION_M, Sections
+from .ridges import STATION_M, Sections
 from .search import parallel
 
 LITTLE = 1e-12
@@ -65,15 +65,9 @@ FOOT_ROUNDS = 2
 
 @dataclass(frozen=True)
 class Smooth:
-    """A smooth curve.
+    """A smooth curve through n places: `values`, (n, d), and the differences that are penalised, `rows`, (k, n).
 
-    Attributes
-    ----------
-    values : (n, d) array
-    covariance : (n, n) array
-        That of the curve, if each place has the variance 1 / weight.
-    rows : (k, n) matrix
-        The differences that are penalised.
+    `covariance`, (n, n), is that of the curve if each place has the variance 1 / weight.
     """
 
     values: np.ndarray
@@ -93,18 +87,10 @@ class Smooth:
 
 
 def smooth(values: np.ndarray, weight: np.ndarray, rows: csr_matrix, sigma: float | np.ndarray) -> Smooth:
-    """Return the curve that balances places and smoothness.
+    """Return the curve that balances places, `values` (n, d), and smoothness.
 
-    Parameters
-    ----------
-    values : (n, d) array
-        Places; those with a weight of 0 may hold any number.
-    weight : (n,) array
-        1 / variance of each.
-    rows : (k, n) matrix
-        Differences that are small, such as those of `differences`.
-    sigma : float or (k,) array
-        Their standard deviation.
+    `weight`, (n,), is 1 / variance; places with a weight of 0 may hold any number. `rows`, (k, n), such as those of
+    `differences`, give differences that are small: `sigma`, one or (k,), is their standard deviation.
     """
     stiffness = np.broadcast_to(1 / np.square(sigma), rows.shape[0])
     matrix = (rows.T @ diags(stiffness) @ rows).toarray()
@@ -123,15 +109,10 @@ def differences(count: int, order: int) -> csr_matrix:
 
 @dataclass(frozen=True)
 class Curve:
-    """The curve of a track at the middles of its sections.
+    """The curve of a track at the middles of its sections, `xy` (n, 2).
 
-    Attributes
-    ----------
-    xy : (n, 2) array
-    sigma : (n,) array
-        Standard error across, metres.
-    beside : (n,) array
-        Distance of the section's own middle from the curve, metres.
+    `sigma`, (n,), is the standard error across, and `beside`, (n,), the distance of the section's own middle from the
+    curve, metres.
     """
 
     xy: np.ndarray
@@ -140,15 +121,10 @@ class Curve:
 
 
 def draw_together(lines: Sequence[Polyline], found: Sequence[Sections]) -> list[Curve]:
-    """Draw the curves of tracks through their sections.
+    """Draw the curves of tracks through their sections, which are seen on `lines`.
 
     How much curvature and distance change is measured along the tracks (expectation maximisation of the variance of the
     differences), so that a straight stays stiff beside a transition and a switch.
-
-    Parameters
-    ----------
-    lines : sequence of Polyline
-        On which the sections are seen.
     """
     stations = [one.stations_on(line) for line, one in zip(lines, found)]
     place = np.concatenate([line.at(t) for line, t in zip(lines, stations)])
@@ -177,17 +153,10 @@ def _spread(residual: np.ndarray) -> float:
 
 @dataclass(frozen=True)
 class _Stiffness:
-    """The differences that are small: those of each track, and those of the distances between them.
+    """The differences that are small, those of each track and of their distances: `rows`, (k, n) over all stations.
 
-    Attributes
-    ----------
-    rows : (k, n) matrix
-        Over the stations of all tracks.
-    first : (k,) array
-        Standard deviations with which the search for them begins.
-    blocks : list of (int, float, int)
-        Number of rows that follow each other along the line, their standard deviation where nothing turns, and for how
-        many sections this counts.
+    The search for their standard deviations begins with `first`, (k,). A block is the number of rows that follow each
+    other along the line, their standard deviation where nothing turns, and for how many sections this counts.
     """
 
     rows: csr_matrix

@@ -10,11 +10,9 @@ from scipy.spatial import cKDTree
 
 from ..polyline import Polyline
 from ..progress import SILENT, Progress
-from .cross_sections import EDGE_M, STATION_M
 from .guide_line import SECTION_M, Points, gather
-from .ridges import HALF_M, Shape
-from .rivals import LONG, TRACKS_APART_M, WIDE_M, Beside, look_beside
-from .rounds import REACHES_M, Refined, Traced, refine, strip_error
+from .ridges import EDGE_M, HALF_M, STATION_M, Shape
+from .rounds import LONG, REACHES_M, TRACKS_APART_M, WIDE_M, Beside, Refined, Traced, look_beside, refine, strip_error
 from .search import Course, Evidence, certainty, courses, evidence, groups, slopes
 
 LONG_GAIN, LONG_SHARE = 7.0, 0.25
@@ -82,26 +80,12 @@ SEEN, EMPTY, HIDDEN, MISLED, UNSURE, TWIN, ASIDE, SPARSE = range(len(REASONS))
 
 @dataclass(frozen=True)
 class Stations:
-    """Stations of a track every `STATION_M` along its guide.
+    """Stations of a track every `STATION_M` along its guide, (n,) arrays; lengths in metres.
 
-    Attributes
-    ----------
-    t : (n,) array
-        Chainage along the guide, metres.
-    xy : (n, 2) array
-        Middle of the track.
-    bed : (n,) array
-        Height of the bed there.
-    tilt : (n,) array
-        Rise of the bed per metre to the left.
-    sigma, sigma_bed : (n,) arrays
-        Standard errors across and of the bed's height, metres.
-    margin : (n,) array
-        Score of the place above that of another one.
-    reason : (n,) int array
-        Place in `REASONS`; 0 where the track is seen.
-    switch : (n,) bool array
-        Whether another track begins or ends beside it.
+    `t` is the chainage along the guide, `xy`, (n, 2), the middle of the track, `bed` the height of the bed there, and
+    `tilt` its rise per metre to the left; `sigma` and `sigma_bed` are the standard errors across and of the bed's
+    height. `margin` is the score of the place above that of another one, `reason` a place in `REASONS`, 0 where the
+    track is seen, and `switch` holds where another track begins or ends beside it.
     """
 
     t: np.ndarray
@@ -119,14 +103,9 @@ class Stations:
 class Fitted:
     """What was found along a guide.
 
-    Attributes
-    ----------
-    shape : Shape or None
-        Ridges as they were measured; None where no track was found.
-    shown_m : float
-        Distance of the rails that the points show where it is clearly not the expected one, else NaN.
-    others : (k, 2) array
-        Chainages and distances to the left of places that look like tracks and have no guide.
+    `shape` has the ridges as they were measured, None where no track was found; `shown_m` is the distance of the rails
+    that the points show where it is clearly not the expected one, else NaN. `others`, (k, 2), holds chainages and
+    distances to the left of places that look like tracks and have no guide.
     """
 
     stations: Stations
@@ -144,22 +123,11 @@ def fit_tracks(
     footprint_m: float,
     progress: Progress = SILENT,
 ) -> list[Fitted]:
-    """Fit the tracks along the guides of a line.
+    """Fit the tracks along the guides of a line to the points around them, `xyz` (n, 3), metres.
 
-    Parameters
-    ----------
-    xyz : (n, 3) array
-        Points around the guides, metres.
-    strip : (n,) int array
-        Number of the strip of each.
-    axes : sequence of Polyline
-        The guides.
-    spacings_m : sequence of float
-        Distance between the middles of the railheads, by guide.
-    reach_m : float
-        Largest distance of a track from its guide.
-    footprint_m : float
-        Diameter of the beam on the ground.
+    `strip`, (n,), is the number of each point's strip, `spacings_m` the distance between the middles of the railheads
+    by guide, `reach_m` the largest distance of a track from its guide, and `footprint_m` the diameter of the beam on
+    the ground.
     """
     shapes = [Shape.expected(spacing_m, footprint_m) for spacing_m in spacings_m]
     looking, fitting = progress.divide((3.0, 2.0))

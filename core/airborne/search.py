@@ -62,11 +62,7 @@ the same."""
 class Evidence:
     """How well places beside a guide show a track.
 
-    Attributes
-    ----------
-    across : (c,) array
-        Distances of the places to the left of the guide, every `STEP_M`.
-    score : (sections, SLOPES, c) array
+    The places are `across`, (c,), to the left of the guide, every `STEP_M`; `score` is (sections, SLOPES, c).
     """
 
     across: np.ndarray
@@ -80,14 +76,10 @@ class Evidence:
 
 @dataclass(frozen=True)
 class Course:
-    """A course beside a guide.
+    """A course beside a guide, (sections,) arrays.
 
-    Attributes
-    ----------
-    across : (sections,) array
-        Distance to the left of the guide in the middle of each section of `SECTION_M`.
-    margin : (sections,) array
-        Score of this course above that of the best one that is elsewhere in the section.
+    `across` is its distance to the left of the guide in the middle of each section of `SECTION_M`, and `margin` its
+    score above that of the best course that is elsewhere in the section.
     """
 
     across: np.ndarray
@@ -178,14 +170,7 @@ class _Move:
 
 
 def courses(axes: Sequence[Polyline], found: Sequence[Evidence]) -> tuple[list[Course], list[np.ndarray]]:
-    """Find the courses of parallel tracks.
-
-    Returns
-    -------
-    list of Course
-    list of (sections, c) arrays
-        Score of each place together with that of the neighbours, for `certainty`.
-    """
+    """Find the courses of parallel tracks, and the score, (sections, c), of each place together with its neighbours."""
     together = [one.best + _support(number, axes, found) for number, one in enumerate(found)]
     joined = []
     for one, score in zip(found, together):
@@ -229,15 +214,9 @@ def _support(number: int, axes: Sequence[Polyline], found: Sequence[Evidence]) -
 
 
 def parallel(place: np.ndarray, normal: np.ndarray, other: Polyline) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return beside which places, (n, 2), with unit vectors to the left, (n, 2), another line is parallel.
+    """Return where another line is parallel, given places, (n, 2), with unit vectors to the left: three (n,) arrays.
 
-    Returns
-    -------
-    parallel : (n,) bool array
-    t : (n,) array
-        Chainage of the other line there.
-    opposite : (n,) bool array
-        Whether it runs the other way.
+    They are whether it is parallel, the chainage of the other line there, and whether it runs the other way.
     """
     distance, nearest = cKDTree(other.xy).query(place, distance_upper_bound=FAR_M)
     near = np.isfinite(distance)
@@ -258,11 +237,7 @@ def _blurred(score: np.ndarray) -> np.ndarray:
 def certainty(course: Course, score: np.ndarray, across: np.ndarray) -> np.ndarray:
     """Return how likely the guide means this track and not another one within reach, (sections,).
 
-    Parameters
-    ----------
-    score : (sections, c) array
-        Together with the neighbours.
-    across : (c,) array
+    `score`, (sections, c), is that of each place in `across`, (c,), together with the neighbours.
     """
     kernel = np.ones(min(RIVAL_SECTIONS, len(score)))
     mean = np.column_stack([np.convolve(one, kernel / len(kernel), "same") for one in score.T])

@@ -42,16 +42,10 @@ SIZES = (8, 12, 18, 27, 40, 60, 90, 135, 200)
 
 @dataclass(frozen=True)
 class Noise:
-    """The errors of a signal.
+    """The errors of a signal, metres.
 
-    Attributes
-    ----------
-    white_m : float
-        Standard deviation of the errors of single points that are independent of each other, metres.
-    shared_m : float
-        Standard deviation of the misalignment, metres.
-    length_m : float
-        Distance at which the correlation of the misalignment has fallen to 1/e, metres.
+    `white_m` is the standard deviation of the errors of single points that are independent of each other, `shared_m`
+    that of the misalignment, and `length_m` the distance at which its correlation has fallen to 1/e.
     """
 
     white_m: float

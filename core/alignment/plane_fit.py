@@ -61,16 +61,9 @@ RIDGE = 1e-9
 
 @dataclass(frozen=True)
 class Points:
-    """The measured line.
+    """The measured line: `xy`, (n, 2) local metres, and the distance `s` along it, (n,).
 
-    Attributes
-    ----------
-    xy : (n, 2) array
-        Local metres.
-    s : (n,) array
-        Distance along the line.
-    weight : (n,) array
-        Inverse of the variance across, 1/m²; 0 where the line bridges a gap.
+    `weight`, (n,), is the inverse of the variance across, 1/m²; 0 where the line bridges a gap.
     """
 
     xy: np.ndarray
@@ -82,18 +75,10 @@ class Points:
 class PlanFit:
     """Elements that fit the points, with what the fit says about them.
 
-    Attributes
-    ----------
-    across : (n,) array
-        Distance of each point from the curve, positive to the left, metres.
-    s : (n,) array
-        Feet of the points.
-    nodes : (e, 2) int array
-        Number of the curvature at start and end of each element; -1 is 0.
-    jacobian : (n, u) sparse array
-        Derivatives of `across` with respect to the unknowns: poses, curvatures, lengths.
-    solver : _Solver
-        Of the equations of the last step.
+    `across` and `s`, (n,), are the distance of each point from the curve, positive to the left, and its foot, metres.
+    `nodes`, (e, 2), is the number of the curvature at start and end of each element; -1 is 0. `jacobian`, (n, u), holds
+    the derivatives of `across` with respect to the unknowns (poses, curvatures, lengths), and `solver` is that of the
+    equations of the last step.
     """
 
     elements: tuple[PlanElement, ...]

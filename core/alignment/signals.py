@@ -41,18 +41,9 @@ that goes on from the table of this one must find it in the same place."""
 class Kind:
     """A kind of signal.
 
-    Attributes
-    ----------
-    order : int
-        How many times the bend is integrated.
-    degrees : tuple of int
-        Of the polynomials in the first partition.
-    ramps : bool
-        Whether the bend may change linearly.
-    least_m : float
-        Least standard deviation of the errors, metres.
-    shown_m : float
-        See `Rules`; where the line was smoothed.
+    `order` is how many times the bend is integrated, `degrees` are those of the polynomials in the first partition, and
+    `ramps` says whether the bend may change linearly. `least_m` is the least standard deviation of the errors, metres;
+    `shown_m` is that of `Rules`, where the line was smoothed.
     """
 
     order: int
@@ -82,14 +73,9 @@ CANT = Kind(1, (0, 1), False, shown_m=math.sqrt(2.0) * LEAST_ERROR_M)
 
 @dataclass(frozen=True)
 class Signal:
-    """A signal along a track.
+    """A signal along a track, (n,) arrays: distance and value, metres, and how much each point counts.
 
-    Attributes
-    ----------
-    s, y : (n,) array
-        Distance and value, metres.
-    share : (n,) array
-        How much each point counts, 1 for a measured one, 0 in a bridged gap.
+    `share` is 1 for a measured point, 0 in a bridged gap.
     """
 
     s: np.ndarray
@@ -220,15 +206,7 @@ LONGEST_M = 1500.0
 
 @dataclass(frozen=True)
 class Polynomial:
-    """A piece of the signal.
-
-    Attributes
-    ----------
-    start, end : float
-        Distances, metres.
-    degree : int
-        Of its polynomial.
-    """
+    """A piece of the signal between two distances, metres, and the degree of its polynomial."""
 
     start: float
     end: float

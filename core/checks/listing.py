@@ -209,15 +209,7 @@ def _of_lone_rail(rail: RailLine) -> Finding:
 
 
 def summary(network: RailNetwork, gauges_m: Sequence[float]) -> tuple[str, str]:
-    """Return the verdict in words, and the figures that it is based on.
-
-    Parameters
-    ----------
-    network : RailNetwork
-        The verdict needs the geometry of its tracks.
-    gauges_m : sequence of float
-        Gauges that tracks may have.
-    """
+    """Return the verdict on tracks, which may have `gauges_m`, in words, and the figures that it is based on."""
     rails, tracks = (
         f"{counted(len(lines), what)} ({metres(sum(line.length_m for line in lines))})"
         for what, lines in (("rail", network.rails), ("track", network.centerlines))

@@ -47,11 +47,11 @@ def is_decided(seen: SearchFigures) -> bool:
 
 
 def _round_m(seen: SearchFigures) -> float:
-    """Return the length of round rails that rails in pavements, which only a sharp cloud shows, do not outweigh.
+    """Return the length of round rails that those which are neither narrow nor round do not outweigh.
 
-    Their grooves may be there by chance, and no width confirms them: images of smooth ground showed 29 m of them.
+    These are rather those of a sharp cloud. But images of smooth ground showed 29 m of rails in pavements, by chance.
     """
-    return seen.round_m - seen.flush_m
+    return seen.round_m - seen.unsure_m
 
 
 def search_alike(parts: Sequence[Part], search: Callable[[Sequence[Part], bool], Iterable[Answer]]) -> Iterator[Answer]:

@@ -213,7 +213,7 @@ class Standing:
         Whether the square is thin.
     rails : Kept
         Those that the guide leaves out as well.
-    sharp_m, round_m : float
+    sharp_m, round_m, unsure_m : float
         See `SearchFigures`.
     blur_m : float
         Blur of the ridges of a blunt cloud.
@@ -225,6 +225,7 @@ class Standing:
     rails: Kept
     sharp_m: float = 0.0
     round_m: float = 0.0
+    unsure_m: float = 0.0
     blur_m: float = 0.0
 
 
@@ -250,10 +251,11 @@ def _on_bars(
     heads = whole_heads(shown.tops, _completed(found, kept, settings, tolerances), tolerances)
     chosen = label(shown.tops, heads, shown.cell, shown.height, tolerances)
     beside = Near.find(shown.xy[chosen], kept.lines)
-    narrow, sharp, rounded = _widths(kept, beside, shown, settings, tolerances)
+    narrow, *kinds = _widths(kept, beside, shown, settings, tolerances)
     standing = _wanted(kept, narrow, chosen, beside, thin, settings, tolerances)
     share_m = _share_m(kept, settings)
-    return replace(standing, sharp_m=float(share_m[sharp].sum()), round_m=float(share_m[rounded].sum()))
+    sharp_m, round_m, unsure_m = (float(share_m[kind].sum()) for kind in kinds)
+    return replace(standing, sharp_m=sharp_m, round_m=round_m, unsure_m=unsure_m)
 
 
 def _on_ridges(kept: Kept, thin: bool, shown: Shown, settings: Settings) -> Standing:
@@ -311,6 +313,7 @@ def _standing_figures(standing: Standing, settings: Settings) -> SearchFigures:
         blur_m2=blunt_m * standing.blur_m,
         sharp_m=standing.sharp_m,
         round_m=standing.round_m,
+        unsure_m=standing.unsure_m,
     )
 
 
@@ -325,7 +328,7 @@ def _flush_figures(flush: Flush, cell: np.ndarray, settings: Settings) -> Search
     along_m, across_m = beside_guide(flush.rails, settings)
     return SearchFigures(
         paired_m=float(share_m.sum()),
-        flush_m=float(share_m.sum()),
+        unsure_m=float(share_m.sum()),
         cells=len(np.unique(cell)),
         paved=int(len(share_m) > 0),
         along_m=float(along_m),
@@ -408,7 +411,7 @@ def _near_axes(marks: Marks, kept: Kept, settings: Settings, height_m: float) ->
 
 def _widths(
     kept: Kept, beside: Near, shown: Shown, settings: Settings, tolerances: Tolerances
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Judge the cells by the width of the tops of their pieces.
 
     Parameters
@@ -424,22 +427,24 @@ def _widths(
     -------
     narrow : (n,) bool array
         Rails: as narrow as a head in a square of this density.
-    sharp, rounded : (n,) bool arrays
-        Those with a partner that are as narrow as a head in a sharp cloud, and those that are wider and round.
+    sharp, rounded, unsure : (n,) bool arrays
+        Those with a partner that are as narrow as a head in a sharp cloud, those that are wider and round, and those
+        that are wider and steep.
     """
     if not len(kept.cell):
-        return (np.zeros(0, dtype=bool),) * 3
+        return (np.zeros(0, dtype=bool),) * 4
     piece = pieces_of(len(kept.cell), kept.pairs)
     width_m = beside.widths(piece)
     partnered = with_partner(kept.pairs, kept.paired)
     narrow = width_m < settings.head_width_m + tolerances.wider_m
     alone = _stands_alone(kept, piece, width_m, shown.bed, settings, tolerances)
     sharp = partnered & (width_m < settings.head_width_m + SHARP_WIDER_M)[piece]
-    rounded = partnered & ~sharp
+    rounded = unsure = partnered & ~sharp
     if rounded.any():
         spread_m = Ridges.measure(shown.xy, shown.height, kept.lines, piece).spread_m
-        rounded &= (spread_m > settings.head_width_m / 2)[piece]
-    return np.where(partnered, narrow[piece], alone[piece]), sharp, rounded
+        rounded = rounded & (spread_m > settings.head_width_m / 2)[piece]
+        unsure = unsure & (spread_m <= settings.head_width_m / 2)[piece]
+    return np.where(partnered, narrow[piece], alone[piece]), sharp, rounded, unsure
 
 
 def _stands_alone(

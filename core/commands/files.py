@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from functools import partial
+from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -14,10 +15,9 @@ import numpy as np
 
 from ..clouds.crs import MAX_COORDINATE, is_geographic, parse_crs
 from ..clouds.readers import CATALOGUE, paths_of
-from ..disk import Destination, writing
+from ..disk import Destination, scratch_folder, writing
 from ..errors import CrsError, ParameterError, RailExtractError
-from ..files.rail_rasters import RasterSource, open_with_rasterio
-from ..files.raster_file import write_rasters
+from ..files.rail_rasters import RasterSource, open_with_rasterio, write_rasters
 from ..jobs import declaration as kinds
 from ..jobs.clouds import Bounds, CloudSource
 from ..jobs.declaration import Job, Parameter
@@ -27,8 +27,6 @@ from ..jobs.values import Values
 from ..progress import Progress
 from ..run.loop import Runner
 from ..run.processes import workers
-from ..scratch import scratch_folder
-from .options import vector_module
 
 if TYPE_CHECKING:
     from ..jobs.features import Source
@@ -244,12 +242,7 @@ def _chosen(one: kinds.Choice, given: Any) -> Any:
 
 
 def _system(one: kinds.System, given: Any) -> str:
-    """Read a coordinate system.
-
-    Raises
-    ------
-    ParameterError
-    """
+    """Read a coordinate system."""
     try:
         crs = parse_crs(str(given))
     except CrsError:
@@ -262,12 +255,7 @@ def _system(one: kinds.System, given: Any) -> str:
 
 
 def _extent(one: kinds.Extent, given: Any) -> Bounds:
-    """Read a rectangle; the order of its numbers is that of command lines and Python, not that of QGIS.
-
-    Raises
-    ------
-    ParameterError
-    """
+    """Read a rectangle; the order of its numbers is that of command lines and Python, not that of QGIS."""
     try:
         xmin, ymin, xmax, ymax = map(float, given.split(",") if isinstance(given, str) else given)
     except (TypeError, ValueError):
@@ -276,12 +264,7 @@ def _extent(one: kinds.Extent, given: Any) -> Bounds:
 
 
 def _places(one: kinds.Place, given: Any) -> list[tuple[float, float]]:
-    """Read one place or several, as texts or as pairs of numbers.
-
-    Raises
-    ------
-    ParameterError
-    """
+    """Read one place or several, as texts or as pairs of numbers."""
     several = isinstance(given, Sequence) and not isinstance(given, str) and not isinstance(given[0], (int, float))
     found = []
     for place in given if several else [given]:
@@ -360,3 +343,16 @@ def destinations_of(job: Job, files: Mapping[str, Path]) -> dict[str, Destinatio
             raise ParameterError(f"{other} and {one.name} are the same file: give each its own name.")
         found[one.name] = shared.setdefault(destination.file, destination)
     return found
+
+
+def vector_module(option: str, name: str = "vectors") -> Any:
+    """Return the module that reads vector files, or another one of this package that needs the same packages.
+
+    Raises ParameterError if the packages are not installed; `option` is what needs them.
+    """
+    try:
+        return import_module(f".{name}", __package__)
+    except ImportError as error:
+        raise ParameterError(
+            f"{option} needs the packages pyogrio and shapely: in a clone, run pip install .[cluster]."
+        ) from error

@@ -35,17 +35,9 @@ def is_stable(changed: int, cells: int) -> bool:
 
 
 def clean(raster: RailRaster, engine: Engine, passes: int = DEFAULT_PASSES, progress: Progress = SILENT) -> RailRaster:
-    """Remove noise and close gaps with the network (Gribov and Chang, sections 5 and 7).
+    """Remove noise and close gaps with the network, on the same grid (Gribov and Chang, sections 5 and 7).
 
-    Parameters
-    ----------
-    passes : int
-        Number of passes; with 0, passes run until the result is stable, at most `MAX_PASSES`.
-
-    Returns
-    -------
-    RailRaster
-        The cleaned raster, on the same grid.
+    With 0, passes run until the result is stable, at most `MAX_PASSES`.
     """
     most = max_passes(passes)
     state, output = None, raster

@@ -24,13 +24,7 @@ CONTEXT = 256
 
 @dataclass(frozen=True)
 class Piece:
-    """A rectangle of cells.
-
-    Attributes
-    ----------
-    row, column : int
-        North-west corner.
-    """
+    """A rectangle of cells, by its north-west corner."""
 
     row: int
     column: int
@@ -52,12 +46,8 @@ class Piece:
 class Field:
     """Pieces that are computed together.
 
-    Attributes
-    ----------
-    inside : Piece
-        Rectangle whose results count; those of a raster do not overlap.
-    pieces : list of Piece
-        Rectangles, without overlap, that cover the corridor inside and, for context, up to `CONTEXT` cells outside.
+    The rectangles `inside`, whose results count, do not overlap in a raster. The pieces, without overlap, cover the
+    corridor inside and, for context, up to `CONTEXT` cells outside.
     """
 
     inside: Piece

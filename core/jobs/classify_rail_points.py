@@ -8,7 +8,7 @@ from ..errors import ParameterError
 from ..parameters import DEFAULT_GUIDE_DISTANCE_M, Parameters
 from ..progress import Estimating
 from ..standards import SEARCHED_CLASSES
-from . import outputs, shared
+from . import inputs, methods, outputs
 from .declaration import CLOUD_NEEDS, CLOUD_WORDS, RAIL_WORDS, RAW_CLOUDS, Flag, Job, Number
 
 if TYPE_CHECKING:
@@ -86,11 +86,11 @@ JOB = Job(
     (*RAIL_WORDS, *CLOUD_WORDS, "classification", "raw", "segmentation", "Klassifizierung"),
     CLOUD_NEEDS,
     (
-        shared.RAW_CLOUD,
-        *shared.RAIL,
-        shared.OTHER_GAUGES,
-        *shared.AREA,
-        shared.GUIDE,
+        inputs.RAW_CLOUD,
+        *inputs.RAIL,
+        methods.OTHER_GAUGES,
+        *inputs.AREA,
+        inputs.GUIDE,
         Number(
             "GUIDE_DISTANCE",
             "Distance from the guide [m]",
@@ -98,7 +98,7 @@ JOB = Job(
             advanced=True,
             default=DEFAULT_GUIDE_DISTANCE_M,
             low=0.5,
-            high=shared.MAX_LENGTH_M,
+            high=methods.MAX_LENGTH_M,
         ),
         Flag(
             "ONLY_GUIDED",
@@ -107,7 +107,7 @@ JOB = Job(
             advanced=True,
             default=False,
         ),
-        *shared.METHOD,
+        *methods.METHOD,
         Flag(
             "KEEP_SINGLE",
             "Keep rails without a partner",
@@ -115,7 +115,7 @@ JOB = Job(
             "example because it is hidden. Otherwise only pairs of rails are kept.",
             default=True,
         ),
-        *shared.CONTENT,
+        *methods.CONTENT,
         Flag(
             "RESET",
             "Reset the class of other points",
@@ -124,7 +124,7 @@ JOB = Job(
             advanced=True,
             default=True,
         ),
-        shared.WORKERS,
+        methods.WORKERS,
     ),
     outputs.CLASSIFIED,
     outputs.CLASSIFIED_FIGURES,

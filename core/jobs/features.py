@@ -1,4 +1,4 @@
-"""What jobs read from vector layers, checked in one place: lines, guides, seeds, masks, axes and tables.
+"""What jobs read from vector layers, checked in one place: lines, guides, seeds, masks, axes, tables, and places.
 
 QGIS reads layers itself, the command line and Python with pyogrio and shapely; both provide a `Source`.
 """
@@ -15,7 +15,7 @@ import numpy as np
 from ..airborne.survey import Guide, gauge_of
 from ..clouds.crs import parse_crs, title_of, unit_in_plan
 from ..clouds.mask import Mask
-from ..design_places import check_line, check_places
+from ..design_numbers import check_line, check_places
 from ..errors import CrsError, MissingError, ParameterError, RailExtractError
 from ..kilometres.axes import (
     AHEAD,
@@ -34,11 +34,17 @@ from ..kilometres.axes import (
 from ..kilometres.stationing import Jump
 from ..progress import Progress
 from .declaration import LINE, POINT, POLYGON
+from .inputs import DECREASING
 from .lines import Lines, Row, system_of, without_steps
-from .shared import DECREASING
 
 if TYPE_CHECKING:
     from .values import Rows, Values
+
+
+from ..design_numbers import are_places
+
+FAR, NOWHERE = np.full(2, np.inf), np.full(2, np.nan)
+"""Places of a feature that is not on any map, and of one without a geometry."""
 
 
 @dataclass(frozen=True)
@@ -75,16 +81,9 @@ class Feature:
 class Source(ABC):
     """A vector layer or a table.
 
-    Attributes
-    ----------
-    name : str
-        Of the parameter that was given it, for messages.
-    count : int
-        Number of features.
-    kinds : collection of str
-        Kinds of the geometries that it may have; none for a table.
-    notices : sequence of str
-        What the user is told of the fields where the features are copied.
+    `name` is the parameter that was given it, for messages; `count` the number of features; `kinds` those of the
+    geometries that it may have, none for a table. `notices` are what the user is told of the fields where the features
+    are copied.
     """
 
     name: str
@@ -114,10 +113,7 @@ class Source(ABC):
 def read_lines(source: Source, progress: Progress) -> Lines:
     """Read all parts of all lines that have a length, in one local frame.
 
-    Raises
-    ------
-    RailExtractError
-        The lines are in degrees, there is none, or one has an impossible vertex.
+    Raises RailExtractError if the lines are in degrees, there is none, or one has an impossible vertex.
     """
     system = system_of(source.crs_wkt, progress)
     parts = (
@@ -137,10 +133,7 @@ def read_rows(source: Source, progress: Progress) -> Rows:
 def read_lines_along(source: Source, crs_wkt: str | None) -> list[np.ndarray]:
     """Read lines that show places along tracks, (k, 2) each, in a coordinate system.
 
-    Raises
-    ------
-    RailExtractError
-        There is none, one leads to a place that is not on the map, or they can't be transformed.
+    Raises RailExtractError if there is none, one leads to a place that is not on the map, or they can't be transformed.
     """
     lines = [line for _, line in _lines_along(source, _placed(source, crs_wkt), crs_wkt)]
     if not lines:
@@ -182,10 +175,7 @@ def read_seeds(source: Source, crs_wkt: str | None) -> list[np.ndarray]:
 def read_mask(source: Source, crs_wkt: str | None) -> Mask:
     """Read the polygons of a mask, of which overlaps count once.
 
-    Raises
-    ------
-    RailExtractError
-        There is none, one is not on the map, or they can't be transformed.
+    Raises RailExtractError if there is none, one is not on the map, or they can't be transformed.
     """
     _placed(source, crs_wkt)
     rings = source.rings(crs_wkt)
@@ -195,17 +185,10 @@ def read_mask(source: Source, crs_wkt: str | None) -> Mask:
 
 
 def read_axes(values: Values, crs_wkt: str | None) -> PlacedAxes:
-    """Read AXIS and what states its kilometres, in a coordinate system.
+    """Read AXIS and what states its kilometres, in a projected coordinate system, or None for metres as they are.
 
-    Parameters
-    ----------
-    crs_wkt : str or None
-        Projected, or None for coordinates in metres that nothing transforms.
-
-    Raises
-    ------
-    RailExtractError
-        A layer can't be transformed or lacks what it should state, or they contradict each other.
+    Raises RailExtractError if a layer can't be transformed or lacks what it should state, or they contradict each
+    other.
     """
     axis, unit_m = values.source("AXIS"), unit_in_plan(crs_wkt)
     lines = list(_axis_lines(axis, crs_wkt, unit_m))
@@ -293,3 +276,44 @@ def _jumps(source: Source) -> list[Jump]:
     """Read the table of jumps."""
     check_jumps(source.fields)
     return [Jump(*(km_of(row[name], name, "JUMPS", number) for name in (BACK, AHEAD))) for number, row in source.rows()]
+
+
+@dataclass(frozen=True)
+class Places:
+    """Features of a layer in the plane of an axis.
+
+    `xy`, (n, 2), is where each counts: half way along a line, inside a polygon, in the mean of points; else `FAR` or
+    `NOWHERE`. `vertices`, (m, 2), are those of all features, of a polygon those of its outer ring, and `owner`, (m,),
+    the number of the feature of each. `originals` is for a `Copy` with further fields.
+    """
+
+    ids: Sequence[int]
+    xy: np.ndarray
+    vertices: np.ndarray
+    owner: np.ndarray
+    are_points: bool
+    originals: Source
+
+
+def places_of(source: Source, plane: str | None, progress: Progress) -> Places:
+    """Read where the features of a layer count in the plane of axes."""
+    for notice in source.notices:
+        progress.warning(notice)
+    features, unit_m = list(progress.follow(source.features(plane), source.count)), unit_in_plan(plane)
+    shapes = [np.concatenate([np.empty((0, 4)), *(part for _, part in one.parts)])[:, :2] for one in features]
+    xy = [_place(feature, shape, unit_m) for feature, shape in zip(features, shapes)]
+    return Places(
+        [feature.number for feature in features],
+        np.reshape(xy, (-1, 2)),
+        np.concatenate([np.empty((0, 2)), *shapes]),
+        np.repeat(np.arange(len(shapes)), list(map(len, shapes))),
+        source.kinds == {POINT},
+        source,
+    )
+
+
+def _place(feature: Feature, shape: np.ndarray, unit_m: float) -> np.ndarray:
+    """Return where a feature with these vertices, (n, 2), counts."""
+    if feature.is_lost or not are_places(shape, unit_m).all():
+        return FAR
+    return feature.middle() if len(shape) else NOWHERE

@@ -36,9 +36,8 @@ if TYPE_CHECKING:
     from ..kilometres.axes import PlacedAxes
     from ..progress import Progress
     from ..run.loop import Runner
-    from .features import Source
+    from .features import Places, Source
     from .lines import Lines
-    from .places import Places
 
 NUMBERS = {
     "SMOOTHING_XY": "smoothing_xy_m",
@@ -175,7 +174,7 @@ class Values(ABC):
 
     def places(self, name: str, plane: str | None, progress: Progress) -> Places:
         """Read the features of a layer of any kind, in the plane of the axes; see `places_of`."""
-        from .places import places_of
+        from .features import places_of
 
         return places_of(self.source(name), plane, progress)
 
@@ -240,13 +239,7 @@ class Values(ABC):
         return GrowParameters(**self._stated(GROWTH))
 
     def has_axis(self) -> bool:
-        """Return whether AXIS is filled in.
-
-        Raises
-        ------
-        ParameterError
-            It is not, but what states its kilometres is.
-        """
+        """Return whether AXIS is filled in; raise ParameterError if only what states its kilometres is."""
         lone = next((name for name in ("START_KM", "POSTS", "JUMPS") if self.filled(name)), None)
         if lone and not self.filled("AXIS"):
             raise ParameterError(f"{lone} needs the line that it applies to: choose AXIS.")
@@ -254,18 +247,12 @@ class Values(ABC):
 
     def engine(self) -> str:
         """Read ENGINE, and check that it is installed and runs on DEVICE."""
-        from ..frpdf.engines import choose_engine
+        from ..frpdf.engine import choose_engine
 
         return choose_engine(self["ENGINE"], self["DEVICE"])
 
     def weights(self) -> Path | None:
-        """Read METHOD and WEIGHTS: the weights of the network that finds rail points, or None for geometry.
-
-        Raises
-        ------
-        ParameterError, ModelError
-            They contradict each other, or can't be used.
-        """
+        """Read METHOD and WEIGHTS: the weights of the network that finds rail points, or None for geometry."""
         from ..learned.model import weights_for
 
         return weights_for(self["METHOD"], self["WEIGHTS"])
@@ -306,13 +293,7 @@ class Values(ABC):
 
 
 def class_numbers(text: str, what: str) -> tuple[int, ...]:
-    """Parse classes such as "10,11"; `what` is the name of the parameter, for the error.
-
-    Raises
-    ------
-    ParameterError
-        The text is not a list of classes, or is empty.
-    """
+    """Parse classes such as "10,11"; `what` is the name of the parameter, for the error."""
     words = [word for word in re.split(r"[;,\s]+", text) if word]
     if not words or not all(map(is_class, words)):
         raise ParameterError(f'{what} "{text}" must be whole numbers from 0 to {LAST_CLASS} such as 10 or 10,11.')

@@ -15,8 +15,7 @@ from scipy.spatial import cKDTree
 from ..polyline import Chords, Polyline, cross
 from ..progress import SILENT, Progress
 from ..rails import Kilometres
-from .stationing import Stationing
-from .text import write_km
+from .stationing import Stationing, write_km
 
 PIECE_M = 10.0
 """Longest part of a segment of the axis among which the nearest is sought, metres."""
@@ -43,16 +42,10 @@ PLACES_AT_ONCE = 5_000
 
 @dataclass(frozen=True)
 class Feet:
-    """Feet of places on an axis; (n,) arrays.
+    """Feet of places on an axis; (n,) arrays, metres.
 
-    Attributes
-    ----------
-    s : float
-        Plan distance of the foot from the first vertex, metres.
-    left_m : float
-        Distance of the place from its foot, positive to the left.
-    beyond_m : float
-        How far the place lies beyond the nearer end, 0 between the ends.
+    `s` is the plan distance of the foot from the first vertex, `left_m` that of the place from its foot, positive to
+    the left, and `beyond_m` how far the place lies beyond the nearer end, 0 between the ends.
     """
 
     s: np.ndarray
@@ -67,12 +60,9 @@ class Feet:
 
 @dataclass(frozen=True)
 class KilometreLine:
-    """A line that carries the kilometres of a railway, directed with them.
+    """A line, `xy` (n, 2) metres, that carries the kilometres of a railway, directed with them.
 
-    Attributes
-    ----------
-    xy : (n, 2) array
-        Vertices, metres; no two successive ones are equal.
+    No two successive vertices are equal.
     """
 
     name: str
@@ -229,16 +219,10 @@ def _groups(axis: np.ndarray) -> Iterator[tuple[int, np.ndarray]]:
 
 @dataclass(frozen=True)
 class Nearest:
-    """The nearest axis of places; (n,) arrays.
+    """The nearest axis of places, -1 without one, and their feet on it as in `Feet`; (n,) arrays.
 
-    Attributes
-    ----------
-    axis : int
-        Its number; -1 without one.
-    s, left_m, distance_m : float
-        See `Feet`.
-    second_m : float
-        Distance of the axis that is the nearest but one; infinity without one, or where it is clearly farther away.
+    `second_m` is the distance of the axis that is the nearest but one; infinity without one, or where it is clearly
+    farther away.
     """
 
     axis: np.ndarray

@@ -14,14 +14,13 @@ from ..clouds.points import Request
 from ..clouds.readers import CATALOGUE, SUFFIXES, list_files
 from ..clouds.rewriting import Places, check_class, rewrite
 from ..clouds.vpc import catalogue_text
-from ..disk import NEW, Destination, alone_in, identity, replace_folder, writing
+from ..disk import NEW, Destination, alone_in, identity, replace_folder, scratch_folder, writing
 from ..errors import DiskError, ParameterError, RailExtractError
 from ..grow.growth import Stop
 from ..progress import SILENT, Progress
 from ..rails import SearchFigures
 from ..run.loop import Runner
 from ..run.tasks import READ_S, Context, Task
-from ..scratch import scratch_folder
 from ..standards import RAIL_CLASS
 from .finding import find_rail_points, report
 
@@ -33,16 +32,9 @@ COPC = ".copc"
 
 @dataclass(frozen=True)
 class Choice:
-    """What is written.
+    """What is written: the class of rail points, and whether other points are left out.
 
-    Attributes
-    ----------
-    class_code : int
-        Class of rail points.
-    only_rails : bool
-        Whether other points are left out.
-    reset : bool
-        Whether points that have the rail class and are not found lose it.
+    With `reset`, points that have the rail class and are not found lose it.
     """
 
     class_code: int = RAIL_CLASS
@@ -52,16 +44,9 @@ class Choice:
 
 @dataclass(frozen=True)
 class Output:
-    """Files to write.
+    """Files to write: the one that opens the result (the only one, or the catalogue of the tiles), and names of tiles.
 
-    Attributes
-    ----------
-    destination : Destination
-        The file that opens the result: the only one, or the catalogue of the tiles.
-    names : tuple of str
-        Name of each tile; empty for a single file.
-    before : tuple of int or None
-        Identity of the folder of the tiles that was there when the run began.
+    `before` is the identity of the folder of the tiles that was there when the run began.
     """
 
     destination: Destination
@@ -81,17 +66,10 @@ class Output:
 
 @dataclass(frozen=True)
 class Result:
-    """What was written.
+    """What was written: the file of `Output`, the number of points that were read, and the figures of the search.
 
-    Attributes
-    ----------
-    file : Path
-        See `Output`.
-    point_count : int
-        Points in the files that were read.
-    stops : tuple of Stop
-        Where rails that grew from seeds were not followed further, in metres from the zero of the request; each place
-        once.
+    `stops` are where rails that grew from seeds were not followed further, in metres from the zero of the request; each
+    place once.
     """
 
     file: Path
@@ -105,27 +83,12 @@ def _folder_at(catalogue: Path) -> Path:
 
 
 def plan_output(paths: Sequence[Path], output: Path, class_code: int, progress: Progress = SILENT) -> Output:
-    """Decide which files to write for an input, and check that this is possible.
+    """Decide which files to write for an input (files, folders, virtual point clouds), and check that this is possible.
 
-    Parameters
-    ----------
-    paths : sequence of Path
-        The input: files, folders or virtual point clouds.
-    output : Path
-        Where the user wants the result. For tiles, its name without the suffix is that of their folder.
-    class_code : int
-        Class of rail points.
-    progress : Progress
-        Receives a warning if a COPC file was asked for.
-
-    Raises
-    ------
-    CloudError
-        A path does not lead to cloud files.
-    DiskError
-        Nothing can be written there.
-    ParameterError
-        The output has no suffix of a cloud, would replace the input, or its format lacks the class.
+    `output` is where the user wants the result; for tiles, its name without the suffix is that of their folder. Warns
+    if a COPC file was asked for. Raises CloudError if a path does not lead to cloud files, DiskError if nothing can be
+    written there, and ParameterError if the output has no suffix of a cloud, would replace the input, or its format
+    lacks the class.
     """
     files = list_files(paths)
     for file in files:

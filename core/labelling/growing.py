@@ -18,8 +18,7 @@ from ..clouds.points import Request
 from ..disk import writing
 from ..errors import OffCloudError, OffRailError
 from ..grow.growth import APART, Growth, Growths, Stop, apart_first
-from ..grow.heads import OnHeads
-from ..grow.settings import GrowSettings
+from ..grow.heads import GrowSettings, OnHeads
 from ..polyline import Polyline
 from ..progress import SILENT, Progress
 from ..rails import SearchFigures
@@ -65,8 +64,6 @@ def grow_files(
 
     Raises
     ------
-    CloudError, DiskError
-        See `files.classify_files`.
     OffCloudError, OffRailError
         No seed is in the cloud, or on a rail.
     """
@@ -138,10 +135,7 @@ def grow_all(
 class Cloud:
     """Points within reach of seeds, sorted into the squares of the classification on disk.
 
-    Parameters
-    ----------
-    places : (k, 2) array
-        Seeds, metres from the zero of the coordinate system.
+    `places`, (k, 2), are the seeds, metres from the zero of the coordinate system.
     """
 
     def __init__(

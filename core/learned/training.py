@@ -22,7 +22,7 @@ from torch.nn import functional
 from ..errors import Cancelled, ModelError, ParameterError
 from ..kernels import device_of
 from ..progress import SILENT, Progress
-from .examples import Examples
+from .blocks import Examples
 from .model import in_groups, inputs, load
 from .network import RandLaNet, parameter_count
 
@@ -66,14 +66,9 @@ CHECKPOINT = "checkpoint.pt"
 
 @dataclass(frozen=True)
 class Settings:
-    """What determines the weights, besides the blocks.
+    """What determines the weights, besides the blocks: each block with rails is learned from in every epoch.
 
-    Attributes
-    ----------
-    epochs : int
-        How many times each block with rails is learned from.
-    start : Path, optional
-        Weights to start from; None means random ones.
+    `start` has weights to start from; None means random ones.
     """
 
     epochs: int
@@ -83,13 +78,7 @@ class Settings:
 
 @dataclass(frozen=True)
 class Figures:
-    """Labels compared with the truth.
-
-    Attributes
-    ----------
-    right, missed, wrong : int
-        Rail points that were found and that were not, and others that were taken for rail.
-    """
+    """Labels compared with the truth: rail points found and missed, and other points that were taken for rail."""
 
     right: int = 0
     missed: int = 0
@@ -126,17 +115,7 @@ def _share(part: int, whole: int) -> float:
 
 @dataclass(frozen=True)
 class Check:
-    """The state of a training at a step.
-
-    Attributes
-    ----------
-    step : int
-        Steps done.
-    loss : float
-        Mean loss of the steps since the last check.
-    figures : Figures
-        Of blocks kept back.
-    """
+    """The state of a training after `step` steps: mean loss since the last check, and figures of blocks kept back."""
 
     step: int
     loss: float
@@ -145,15 +124,7 @@ class Check:
 
 @dataclass(frozen=True)
 class Trained:
-    """The result of a training.
-
-    Attributes
-    ----------
-    by_tile : dict of int to Figures
-        Of the blocks kept back, by tile of the cloud.
-    blocks, kept_back : int
-        Blocks learned from, and kept back.
-    """
+    """The result of a training: blocks learned from, blocks kept back, and their figures by tile of the cloud."""
 
     network: RandLaNet
     checks: tuple[Check, ...]
@@ -176,23 +147,11 @@ class Trained:
 def train(
     examples: Examples, settings: Settings, folder: Path, device: str = "AUTO", progress: Progress = SILENT
 ) -> Trained:
-    """Train from the beginning, or from the checkpoint in a folder.
+    """Train from the beginning, or from the checkpoint in a folder, on the device AUTO, CPU or CUDA.
 
-    Parameters
-    ----------
-    folder : Path
-        For the checkpoint.
-    device : {"AUTO", "CPU", "CUDA"}
-    progress : Progress
-        Cancelled, the training leaves a checkpoint.
-
-    Raises
-    ------
-    ParameterError
-        The labelled rails lie in one place, or the checkpoint belongs to another training.
-    ModelError
-        There is no CUDA device, or it has too little memory; the weights to start from are missing or something else.
-    Cancelled
+    Cancelled, the training leaves a checkpoint. Raises ParameterError if the labelled rails lie in one place, or the
+    checkpoint belongs to another training; ModelError if there is no CUDA device, it has too little memory, or the
+    weights to start from are missing or something else.
     """
     kept_back = examples.validation(settings.seed)
     run = _Run(examples, settings, np.flatnonzero(~kept_back), np.flatnonzero(kept_back), folder, device_of(device))

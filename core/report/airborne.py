@@ -7,14 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..airborne.cross_sections import STATION_M
-from ..airborne.remarks import FLIGHT
-from ..airborne.survey import AirborneTrack, Survey
+from ..airborne.ridges import STATION_M
+from ..airborne.survey import FLIGHT, AirborneTrack, Survey
 from ..checks.listing import OFF_RAIL_MM, Finding
 from ..progress import counted, metres, written
 from .markup import legend, made, page, section, table, verdict_box
-from .origin import stated
-from .plan import Course, draw_plan
+from .page import stated
+from .plots import Course, draw_plan
 
 GOOD_SHARE, FAIR_SHARE = 0.95, 0.7
 """Shares of the guides' length that must be seen for a verdict of good, and of usable."""
@@ -92,15 +91,7 @@ def _verdict(survey: Survey) -> tuple[str, str]:
 
 
 def airborne_page(survey: Survey, source: str, facts: Mapping[str, str]) -> str:
-    """Return the report as a complete HTML document.
-
-    Parameters
-    ----------
-    source : str
-        Name of the cloud.
-    facts : mapping of str to str
-        Further facts to state, by name.
-    """
+    """Return the report as a complete HTML document, with the name of the cloud and further facts by name."""
     kind, words = _verdict(survey)
     return page(
         f"Rail Extract: {source}",

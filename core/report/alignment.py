@@ -12,13 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from ..alignment.deviations import Deviations
 from ..alignment.elements import Alignment, CantElement, Element, PlanElement, VerticalElement
+from ..alignment.measured import Deviations
 from ..alignment.stations import StationRange, stations_of
 from ..checks.findings import largest, rms
 from ..progress import metres
 from .markup import figure, legend, made, page, section, table, tag, text, tiles
-from .origin import stated
+from .page import stated
 from .plots import LEFT, SPACE, TICKS_ACROSS, WIDTH, Curve, Frame, Panel, across, bottom_of, broken, round_up
 
 PROPOSAL = (
@@ -76,24 +76,10 @@ def build_alignment_page(
     fitted: bool,
     warnings: Sequence[str] = (),
 ) -> str:
-    """Return the report on alignments and the tracks beside them.
+    """Return the report on alignments and the tracks beside them, a complete HTML document.
 
-    Parameters
-    ----------
-    courses : sequence of (Alignment, Deviations)
-    source : str
-        Name of the measured tracks.
-    facts : mapping of str to str
-        Facts to state by name, besides date, version and coordinate system.
-    fitted : bool
-        Whether the alignments were fitted to these tracks.
-    warnings : sequence of str
-        What the user was warned of.
-
-    Returns
-    -------
-    str
-        A complete HTML document.
+    `source` names the measured tracks, `facts` are stated by name besides date, version and coordinate system, and
+    `warnings` are what the user was warned of. `fitted` says whether the alignments were fitted to these tracks.
     """
     stated_facts = {
         **stated(courses[0][0].frame.crs_wkt),

@@ -11,7 +11,7 @@ from .markup import made, note, page, section, table, verdict_box
 from .plots import Curve, Panel, draw_panels
 
 if TYPE_CHECKING:
-    from ..learned.examples import Plan
+    from ..learned.blocks import Plan
     from ..learned.training import Figures, Trained
     from ..standards import RailStandard
 
@@ -27,20 +27,7 @@ NOTE = (
 
 
 def build_card(trained: Trained, tiles: Sequence[str], facts: Mapping[str, str]) -> str:
-    """Return the card of a training.
-
-    Parameters
-    ----------
-    tiles : sequence of str
-        Names of the files of the cloud, by number.
-    facts : mapping of str to str
-        Further facts to state, such as settings, by name.
-
-    Returns
-    -------
-    str
-        A complete HTML document.
-    """
+    """Return the card of a training, a complete HTML document, with the names of the cloud's files and more facts."""
     total = trained.total
     rows = [_row(tiles[number], figures) for number, figures in trained.by_tile.items()]
     return page(

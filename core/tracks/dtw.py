@@ -25,14 +25,9 @@ TIE = 1e-9
 class Match:
     """A section of one polyline and the section of another that it matches.
 
-    Attributes
-    ----------
-    first, second : (k,) int arrays
-        Successive vertices; from one entry to the next, exactly one of the two advances by one.
-    length : float
-        Sum of the lengths of both sections.
-    penalty : float
-        Squared distance between vertices and their segments, integrated over the segments.
+    `first` and `second`, (k,), are successive vertices: from one entry to the next, exactly one of the two advances by
+    one. `length` is the sum of the lengths of both sections, `penalty` the squared distance between vertices and their
+    segments, integrated over the segments.
     """
 
     first: np.ndarray
@@ -43,17 +38,10 @@ class Match:
 
 @dataclass(frozen=True)
 class Edges:
-    """Valid pairs of a vertex and a segment as edges of the lattice, sorted by first, second and kind.
+    """Valid pairs of a vertex and a segment as edges of the lattice, (n,) each, sorted by first, second and kind.
 
-    Attributes
-    ----------
-    first, second : (n,) int arrays
-        Lattice node at which the edge starts.
-    kind : (n,) int array
-        ADVANCE_SECOND or ADVANCE_FIRST.
-    length : (n,) array
-        Length of the segment.
-    penalty : (n,) array
+    An edge starts at the node (`first`, `second`); its `kind` is ADVANCE_SECOND or ADVANCE_FIRST, and its `length` that
+    of the segment.
     """
 
     first: np.ndarray
@@ -64,19 +52,14 @@ class Edges:
 
 
 def match_polylines(first: np.ndarray, second: np.ndarray, tolerance: float) -> list[Match]:
-    """Find the matches of two polylines in their given directions; the longest comes first.
+    """Find the matches of two polylines, (m, 2) and (n, 2), in their given directions; the longest comes first.
+
+    Vertices are abreast of each other, or else at steps of at most half the tolerance: the middle of a longer segment
+    may be too far from any vertex. `tolerance` is the maximum distance between a vertex and a segment, exclusive.
 
     The longest path wins, and of equally long ones the one with the lowest penalty. Paths that share or continue an
     edge form a cluster, and each cluster gives one match. The paper says that a pair does not "follow" one further
     along; any order works in which pairs precede their continuations, and that of the lattice nodes is used here.
-
-    Parameters
-    ----------
-    first, second : (m, 2), (n, 2) arrays
-        Vertices that are abreast of each other, or else at steps of at most half the tolerance: the middle of a longer
-        segment may be too far from any vertex.
-    tolerance : float
-        Maximum distance between a vertex and a segment, exclusive, in the unit of the vertices.
     """
     edges = lattice_edges(first, second, tolerance)
     if not len(edges.first):

@@ -62,10 +62,8 @@ def measure_track_geometry(
         Preferably from `remeasuring.measure_rails`, with heights smoothed over 1 m only and with support by
         chainage. For a rail without support, `sigma_mm` is used everywhere and `points` are assumed to be evenly
         spaced; without known gaps, it counts as bridged only where it is missing.
-    head_width_m : float
     step_m : float
         Distance between stations; the last station is the end of the track.
-    progress : Progress
     gauges : sequence of Gauge
         Gauges that tracks may have, if the width of the heads depends on them.
 

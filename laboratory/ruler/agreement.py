@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...core.comparison.pieces import cut
+from ...core.comparison.measures import cut
 from ...core.polyline import Chords
 from ...core.rails import RailLine
 

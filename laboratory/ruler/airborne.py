@@ -11,9 +11,8 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ...core.airborne.files import survey_files
+from ...core.airborne.files import Run, survey_files
 from ...core.airborne.fitting import REASONS, STATION_M
-from ...core.airborne.reading import Run
 from ...core.airborne.survey import SWITCH, AirborneTrack, Guide, Survey
 from ...core.clouds.points import ask
 from ...core.parameters import AirborneParameters

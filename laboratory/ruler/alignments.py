@@ -11,8 +11,7 @@ from scipy.special import erf
 
 from ...core.alignment.elements import Alignment, Element, PlanElement, VerticalElement
 from ...core.alignment.fit import fit_track
-from ...core.alignment.held import given_of, noted
-from ...core.alignment.layouts import plan_errors
+from ...core.alignment.layouts import given_of, noted, plan_errors
 from ...core.alignment.noise import Noise
 from ...core.alignment.plane_fit import Points, fit_plan
 from ...core.errors import ParameterError

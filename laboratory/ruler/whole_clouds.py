@@ -11,8 +11,7 @@ import numpy as np
 from ...core.classify.settings import MARGIN_M, Settings
 from ...core.classify.sharpness import search_alike
 from ...core.classify.square import Classified
-from ...core.grow.heads import OnHeads, Rail
-from ...core.grow.settings import GrowSettings
+from ...core.grow.heads import GrowSettings, OnHeads, Rail
 from ...core.labelling.finding import search_square
 from ...core.progress import SILENT, Progress
 from ...core.rails import SearchFigures

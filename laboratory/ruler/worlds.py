@@ -19,7 +19,7 @@ from scipy.spatial import cKDTree
 from ...core.checks.findings import examine
 from ...core.checks.listing import Finding, list_findings, verdict
 from ...core.clouds.points import ask
-from ...core.comparison.pieces import cut
+from ...core.comparison.measures import cut
 from ...core.errors import RailExtractError
 from ...core.parameters import Parameters
 from ...core.pipeline import extract_files

@@ -83,7 +83,7 @@ class GrowTask(QgsTask):
         import numpy as np
 
         from ...core.clouds.points import ask
-        from ...core.grow.settings import GrowSettings
+        from ...core.grow.heads import GrowSettings
         from ...core.kernels import blas, one_thread
         from ...core.labelling.growing import described, grow_all
 

@@ -16,9 +16,9 @@ from qgis.core import (
     QgsProperty,
 )
 
+from ...core.disk import scratch_folder, sweep
 from ...core.errors import CloudError
 from ...core.jobs.clouds import CloudSource
-from ...core.scratch import scratch_folder, sweep
 
 
 def cloud_source(value: Any, context: QgsProcessingContext) -> CloudSource:

@@ -13,9 +13,9 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+from ...core.disk import scratch_folder, sweep
 from ...core.errors import RailExtractError
 from ...core.progress import SILENT, Progress
-from ...core.scratch import scratch_folder, sweep
 from . import processes
 from .dependencies import OWNED_BY_QGIS, is_installed, pins
 from .interpreter import Interpreter

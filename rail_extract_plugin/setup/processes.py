@@ -9,8 +9,8 @@ from pathlib import Path
 
 from qgis.PyQt.QtCore import QProcess, QProcessEnvironment
 
+from ...core.disk import scratch_folder
 from ...core.progress import SILENT, Progress
-from ...core.scratch import scratch_folder
 
 POLL_MS = 200
 """Interval at which output is shown and cancellation is checked, milliseconds."""

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from osgeo import gdal
 
-from ...core.files.raster_file import BLOCK, NO_DATA, RasterHeader
+from ...core.files.rail_rasters import BLOCK, NO_DATA, RasterHeader
 from ...core.progress import SILENT, Progress
 from ...core.raster import RailRaster
 

@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     import numpy as np
 
     from ...core.files.layers import AnyLayer, Copy, Layer
-    from ...core.files.raster_file import RasterHeader
+    from ...core.files.rail_rasters import RasterHeader
     from ...core.frame import LocalFrame
     from ...core.raster import RailRaster
 

@@ -14,10 +14,9 @@ from qgis.core import (
     QgsProperty,
 )
 
-from ...core.disk import Destination
+from ...core.disk import Destination, scratch_folder
 from ...core.errors import RailExtractError
-from ...core.files.geopackage import tables_in
-from ...core.scratch import scratch_folder
+from ...core.files.writing import tables_in
 from ..dialog.parameter_values import ParameterValues
 from .destinations import appends, output_file, table_of
 

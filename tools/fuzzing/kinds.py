@@ -92,7 +92,7 @@ def _make_weights(folder: Path) -> list[Path]:
 
 def _read_weights(path: Path) -> None:
     from rail_extract.core.frpdf.architecture import fold
-    from rail_extract.core.frpdf.weights import load_arrays
+    from rail_extract.core.frpdf.models import load_arrays
 
     fold(load_arrays(path))
 
@@ -118,7 +118,7 @@ def _read_spool(path: Path) -> None:
 
 def _spooled(cloud: Path, folder: Path) -> Sequence:
     from rail_extract.core.clouds.points import ask
-    from rail_extract.core.tiles.spool import spool
+    from rail_extract.core.tiles.store import spool
 
     return spool(ask(cloud, [RAIL]), SPOOL_SIDE_M, folder)
 
@@ -129,7 +129,7 @@ def _make_stored(folder: Path) -> list[Path]:
     from rail_extract.core.rails import RailLine
     from rail_extract.core.raster import rasterize
     from rail_extract.core.squares.kept import save
-    from rail_extract.core.squares.pieces import SquareRails
+    from rail_extract.core.squares.seams import SquareRails
     from rail_extract.core.tiles.grid import Square
 
     xyz = np.random.default_rng(0).uniform(0, 20, (500, 3))
@@ -240,9 +240,9 @@ def _read_names(path: Path) -> None:
 
 def _make_moving(folder: Path) -> list[Path]:
     """Write the temporary folder of a run that was killed while it moved the files of a shapefile."""
-    from rail_extract.core import disk, scratch
+    from rail_extract.core import disk
 
-    killed = folder / f"{scratch.PREFIX}{'0' * 12}"
+    killed = folder / f"{disk.PREFIX}{'0' * 12}"
     for name in (disk.NEW, disk.OLD):
         (killed / name).mkdir(parents=True)
         (killed / name / "a.shp").write_bytes(b"shp")
@@ -253,10 +253,10 @@ def _make_moving(folder: Path) -> list[Path]:
 
 def _read_moving(path: Path) -> None:
     """Complete an interrupted move, as the next run does: nothing is written outside of the folder."""
-    from rail_extract.core import disk, scratch
+    from rail_extract.core import disk
 
     folder = path.parents[1]
-    os.utime(path.parent, (0, time.time() - scratch.MIN_UNMARKED_AGE_S - 1))
+    os.utime(path.parent, (0, time.time() - disk.MIN_UNMARKED_AGE_S - 1))
     disk.Destination.at(folder / "next.txt")
     if path.exists():
         raise AssertionError("the temporary folder is still there")

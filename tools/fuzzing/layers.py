@@ -120,7 +120,7 @@ def compact(path: Path) -> None:
 def write_raster(folder: Path) -> list[Path]:
     """Write a small rail raster."""
     from rail_extract.core.clouds.crs import import_pyproj
-    from rail_extract.core.files.raster_file import header_for
+    from rail_extract.core.files.rail_rasters import header_for
     from rail_extract.core.frame import LocalFrame
     from rail_extract.core.raster import rasterize
     from rail_extract.core.standards import STANDARDS

@@ -8,7 +8,7 @@ import numpy as np
 import torch
 from rail_extract.core.errors import RailExtractError
 from rail_extract.core.labelling.training import EXAMPLES
-from rail_extract.core.learned.examples import Examples, save_index, write_square
+from rail_extract.core.learned.blocks import Examples, save_index, write_square
 from rail_extract.core.learned.training import Settings, _Run
 from rail_extract.laboratory.scenes.raw_shapes import flat, rough, with_track
 

@@ -4,11 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rail_extract.core.airborne import reading
-from rail_extract.core.airborne.files import survey_files
-from rail_extract.core.airborne.reading import Run
-from rail_extract.core.airborne.remarks import FLIGHT
-from rail_extract.core.airborne.survey import Guide
+from rail_extract.core.airborne import files
+from rail_extract.core.airborne.files import Run, survey_files
+from rail_extract.core.airborne.survey import FLIGHT, Guide
 from rail_extract.core.clouds.points import ask
 from rail_extract.core.clouds.vpc import catalogue_text
 from rail_extract.core.errors import CloudError, NoRailPointsError, ParameterError
@@ -100,7 +98,7 @@ def test_figures_are_metres_in_a_cloud_in_feet(flown, whole, tmp_path):
 
 
 def test_tiles_and_squares_give_the_lines_of_one_file(flown, whole, tmp_path, monkeypatch):
-    monkeypatch.setattr(reading, "SIDE_M", 180.0)
+    monkeypatch.setattr(files, "SIDE_M", 180.0)
     write_tiles(flown.cloud, 0, tmp_path)
     found = survey(tmp_path, guides(flown), tmp_path)
     assert len(list((tmp_path / "points").glob("*/*"))) >= 3

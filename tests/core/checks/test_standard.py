@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rail_extract.core.checks.gauge_estimate import SEEN_SHARE
+from rail_extract.core.checks.points import SEEN_SHARE
 from rail_extract.core.checks.standard import head_widths, warn_of_gauge, warn_of_raw, warn_of_spacing
 from rail_extract.core.clouds.points import RailPoints
 from rail_extract.core.frame import LocalFrame

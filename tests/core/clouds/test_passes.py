@@ -6,7 +6,7 @@ from rail_extract.core.clouds.las import laspy
 from rail_extract.core.clouds.passes import marks_of, number_passes
 from rail_extract.core.clouds.points import ask, read_rail_points
 from rail_extract.core.tiles.grid import Square
-from rail_extract.core.tiles.spool import spool
+from rail_extract.core.tiles.store import spool
 
 SPEED, START = 12.0, 3.2e8
 """Metres per second, and a time of adjusted standard GPS."""

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from rail_extract.core.comparison.pieces import cut, spacing_and_cant
-from rail_extract.core.comparison.shift import find_shift
+from rail_extract.core.comparison.measures import cut, find_shift, spacing_and_cant
 from rail_extract.core.comparison.tracks import Survey, SurveyedLine, compare_surveys
 from rail_extract.core.errors import Cancelled
 from rail_extract.core.parameters import ComparisonParameters

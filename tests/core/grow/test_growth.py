@@ -5,9 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as some
 from rail_extract.core.errors import Cancelled
-from rail_extract.core.grow.follow import Reason
-from rail_extract.core.grow.growth import grow
-from rail_extract.core.grow.settings import GrowSettings
+from rail_extract.core.grow.growth import Reason, grow
+from rail_extract.core.grow.heads import GrowSettings
 from rail_extract.core.parameters import GrowParameters
 from rail_extract.core.progress import Progress
 from rail_extract.laboratory.ruler.whole_clouds import GrowingCloud

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from rail_extract.core.kilometres.axes import AxisLine, Post, Start, make_axes
 from rail_extract.core.kilometres.line import locate
-from rail_extract.core.kilometres.stationing import Jump
-from rail_extract.core.kilometres.text import HECTOMETRES
+from rail_extract.core.kilometres.stationing import HECTOMETRES, Jump
 
 
 def line(*x, m=None, name="", y=0.0):

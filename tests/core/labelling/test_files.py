@@ -8,11 +8,11 @@ from rail_extract.core.classify.settings import Settings
 from rail_extract.core.clouds.las import laspy
 from rail_extract.core.clouds.points import ask
 from rail_extract.core.clouds.vpc import list_tiles
+from rail_extract.core.disk import scratch_folder
 from rail_extract.core.errors import Cancelled, CloudError, DiskError, ParameterError, RailExtractError
 from rail_extract.core.labelling.files import Choice, classify_files, plan_output
 from rail_extract.core.progress import Progress, Recording
 from rail_extract.core.run.loop import Answer, InTurn, Runner
-from rail_extract.core.scratch import scratch_folder
 from rail_extract.core.standards import SEARCHED_CLASSES
 from rail_extract.laboratory.scenes.raw_shapes import flat, rough, with_track
 

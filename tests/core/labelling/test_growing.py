@@ -5,17 +5,17 @@ import pytest
 from rail_extract.core.clouds.las import laspy
 from rail_extract.core.clouds.points import ask
 from rail_extract.core.clouds.vpc import list_tiles
+from rail_extract.core.disk import scratch_folder
 from rail_extract.core.errors import ParameterError, RailExtractError
 from rail_extract.core.grow import growth as many_seeds
-from rail_extract.core.grow.follow import Reason
-from rail_extract.core.grow.settings import GrowSettings
+from rail_extract.core.grow.growth import Reason
+from rail_extract.core.grow.heads import GrowSettings
 from rail_extract.core.grow.start import find_start
 from rail_extract.core.labelling.files import Choice, plan_output
 from rail_extract.core.labelling.growing import grow_files
 from rail_extract.core.parameters import GrowParameters
 from rail_extract.core.progress import Progress, Recording
 from rail_extract.core.run.loop import Runner
-from rail_extract.core.scratch import scratch_folder
 from rail_extract.core.standards import SEARCHED_CLASSES
 from rail_extract.laboratory.scenes.raw_strips import GAUGE_M, SPACING_M, WIDTH_M, strip
 

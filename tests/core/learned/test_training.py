@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from rail_extract.core.errors import Cancelled, ModelError, ParameterError
-from rail_extract.core.learned.examples import Examples, save_index, write_square
+from rail_extract.core.learned.blocks import Examples, save_index, write_square
 from rail_extract.core.progress import Progress
 from rail_extract.laboratory.scenes.raw_shapes import track_beside_kerb
 

@@ -17,13 +17,12 @@ from rail_extract.core.progress import SILENT, Progress
 from rail_extract.core.rails import RailLine
 from rail_extract.core.run.cluster import Cluster, execute
 from rail_extract.core.run.loop import InTurn, Runner
-from rail_extract.core.run.tasks import Task
-from rail_extract.core.run.version import version
+from rail_extract.core.run.tasks import Task, version
 from rail_extract.core.squares.kept import KeptResults
 from rail_extract.core.squares.steps import square_side
 from rail_extract.core.standards import STANDARDS
 from rail_extract.core.tiles.grid import lay_out
-from rail_extract.core.tiles.spool import spool
+from rail_extract.core.tiles.store import spool
 from rail_extract.laboratory.scenes.scene import RAIL
 
 STANDARD = STANDARDS["EN_60E1_1435"]

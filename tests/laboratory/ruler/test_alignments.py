@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from rail_extract.core.alignment.elements import Alignment, chained
-from rail_extract.core.alignment.held import given_of, noted
+from rail_extract.core.alignment.layouts import given_of, noted
 from rail_extract.core.alignment.plane_fit import Points, fit_plan
 from rail_extract.core.frame import LocalFrame
 from rail_extract.laboratory.designs import surveyed

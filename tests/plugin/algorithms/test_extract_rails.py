@@ -20,9 +20,9 @@ from qgis.core import (
     QgsRectangle,
     QgsVectorLayer,
 )
+from rail_extract.core.disk import PREFIX
 from rail_extract.core.kernels import blas
 from rail_extract.core.run import processes
-from rail_extract.core.scratch import PREFIX
 
 POINTS = f"{PREFIX}*/*/10_*"
 """Files with temporary points of class 10."""
