@@ -50,15 +50,7 @@ SHOWN = 3
 
 @dataclass(frozen=True)
 class Switch:
-    """A rule and what stands in for it when it is off.
-
-    Attributes
-    ----------
-    name : str
-        Module and rule.
-    off : tuple of (str, str, object)
-        Module below `rail_extract.core`, name in it, and its value when the rule is off.
-    """
+    """A rule, and by module below `rail_extract.core` and name in it, the values that replace it when it is off."""
 
     name: str
     off: tuple[tuple[str, str, Any], ...]
@@ -245,13 +237,7 @@ def _largest(moved: Sequence[Difference]) -> str:
 
 
 def ablate(task: tuple[str, Sequence[str], str]) -> dict[str, list[Difference]]:
-    """Run a scene with all rules, and without each of those that have an effect in it.
-
-    Returns
-    -------
-    dict of str to list of Difference
-        By name of the rules that have an effect; the list has the figures that moved.
-    """
+    """Run a scene with all rules and without each; returns the figures that moved, by the rules that have an effect."""
     place, names, name = task
     variant = next(one for one in VARIANTS if one.name == name)
     scene = build_scene(place, variant.seed_shift)

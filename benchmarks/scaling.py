@@ -110,16 +110,7 @@ def main() -> None:
 
 
 def compare_lengths(folder: Path, km: float, times: int) -> dict:
-    """Run a short and a long track, each in a separate process, and return the figures of the long one.
-
-    Parameters
-    ----------
-    folder : Path
-    km : float
-        Length of the short track.
-    times : int
-        Ratio of the two lengths.
-    """
+    """Run tracks of `km` and `times` as much, each in a separate process, and return the figures of the long one."""
     lay_track(folder / "short", km)
     lay_track(folder / "long", km * times)
     short = show(f"{km:g} km", in_own_process(folder / "short", DRAWN))
@@ -167,13 +158,7 @@ def compare_processes(tiles: Path) -> None:
 
 
 class Threads:
-    """Executes tasks on threads of this process, to compare with processes: Python runs one of them at a time.
-
-    Parameters
-    ----------
-    places : int
-        Number of threads.
-    """
+    """Executes tasks on threads of this process, to compare with processes: Python runs one of them at a time."""
 
     def __init__(self, places: int) -> None:
         self.places = places

@@ -26,15 +26,15 @@ from ..run.tasks import READ_S, Context, Task
 from ..standards import STANDARDS
 from ..tiles.grid import Key
 from ..tiles.store import SortedFile, append, counts_of, files_of, read_stored
-from .fitting import EMPTY, SEEN, Fitted, Stations, fit_tracks
+from .fitting import EMPTY, SEEN, Fitted, TrackStations, fit_tracks
 from .guide_line import axis_of_guide
 from .ridges import HALF_M, STATION_M
 from .rounds import WIDE_M
 from .survey import (
     FLIGHT,
+    AirborneSurvey,
     AirborneTrack,
-    Guide,
-    Survey,
+    GuideLine,
     are_hints,
     joined_others,
     lines_of,
@@ -92,7 +92,7 @@ class Run:
 
 
 @dataclass(frozen=True)
-class Piece:
+class GuidePart:
     """The part of guide `number` in a square, whose stations are those between two chainages of the guide.
 
     The axis has margins, and its first chainage is a multiple of `STATION_M`.
@@ -104,15 +104,15 @@ class Piece:
     last_m: float
 
 
-def pieces_by_square(axes: Sequence[Polyline]) -> dict[Key, tuple[Piece, ...]]:
+def pieces_by_square(axes: Sequence[Polyline]) -> dict[Key, tuple[GuidePart, ...]]:
     """Divide guides into squares."""
-    found: dict[Key, list[Piece]] = {}
+    found: dict[Key, list[GuidePart]] = {}
     for number, axis in enumerate(axes):
         for key, first_m, last_m in _stays(axis):
             low_m = max(np.floor((first_m - MARGIN_M) / STATION_M) * STATION_M, 0.0)
             inside = slice(*np.searchsorted(axis.t, [low_m, np.nextafter(last_m + MARGIN_M, np.inf)]))
             around = Polyline(axis.xy[inside], axis.t[inside])
-            found.setdefault(key, []).append(Piece(number, around, first_m, last_m))
+            found.setdefault(key, []).append(GuidePart(number, around, first_m, last_m))
     return {key: tuple(pieces) for key, pieces in sorted(found.items())}
 
 
@@ -147,7 +147,7 @@ def numbers_of(cells: np.ndarray) -> np.ndarray:
     return cells[:, 0] * ROW + cells[:, 1]
 
 
-def areas_along(pieces: Sequence[Piece], reach_m: float) -> np.ndarray:
+def areas_along(pieces: Sequence[GuidePart], reach_m: float) -> np.ndarray:
     """Return rectangles that hold all places within reach of the pieces, (k, 4) metres."""
     parts = [
         part for piece in pieces for part in np.array_split(piece.axis.xy, max(int(len(piece.axis.xy) / AREA_M), 1))
@@ -156,7 +156,7 @@ def areas_along(pieces: Sequence[Piece], reach_m: float) -> np.ndarray:
     return np.column_stack([low - reach_m, high + reach_m])
 
 
-def spool(run: Run, squares: Mapping[Key, tuple[Piece, ...]]) -> list[SortedFile]:
+def spool(run: Run, squares: Mapping[Key, tuple[GuidePart, ...]]) -> list[SortedFile]:
     """Sort the points around the guides into squares on disk."""
     request, folder = run.request, run.folder
     wide_m = run.parameters.reach_m + WIDE_M + HALF_M
@@ -209,7 +209,7 @@ def density_of(xy: np.ndarray) -> np.ndarray:
     return number / PLACE_M**2
 
 
-def survey_files(run: Run, guides: Sequence[Guide]) -> Survey:
+def survey_files(run: Run, guides: Sequence[GuideLine]) -> AirborneSurvey:
     """Find the track of each guide in a cloud.
 
     Raises CloudError if a file is damaged or the cloud is one of mobile lidar, NoRailPointsError if no point of these
@@ -250,16 +250,16 @@ def survey_files(run: Run, guides: Sequence[Guide]) -> Survey:
     for warning in warnings:
         progress.warning(warning)
     progress.info(FLIGHT)
-    return Survey(numbered, lines, frame, density, tuple(warnings))
+    return AirborneSurvey(numbered, lines, frame, density, tuple(warnings))
 
 
 def _fit(
     run: Run,
-    squares: Mapping[Key, tuple[Piece, ...]],
+    squares: Mapping[Key, tuple[GuidePart, ...]],
     files: Mapping[Key, list[str]],
     counts: Mapping[Key, int],
     spacings_m: Sequence[float],
-) -> list[list[tuple[Piece, Fitted]]]:
+) -> list[list[tuple[GuidePart, Fitted]]]:
     """Fit all squares that have points, and return what was found along each guide, piece by piece."""
     tasks: dict[Key, Task] = {
         key: Task(
@@ -272,14 +272,14 @@ def _fit(
         if key in counts
     }
     found: dict[Key, list[Fitted]] = dict(run.runner.run(tasks, run.progress))
-    fitted: list[list[tuple[Piece, Fitted]]] = [[] for _ in spacings_m]
+    fitted: list[list[tuple[GuidePart, Fitted]]] = [[] for _ in spacings_m]
     for key in tasks:
         for piece, one in zip(squares[key], found[key]):
             fitted[piece.number].append((piece, one))
     return fitted
 
 
-def _check_degrees(request: Request, guides: Sequence[Guide]) -> None:
+def _check_degrees(request: Request, guides: Sequence[GuideLine]) -> None:
     """Refuse guides that are in degrees without saying so: a cloud has no such small coordinates."""
     largest = np.nanmax(np.abs([header.extent for header in request.headers]))
     if largest > 360 and all((np.abs(guide.xy[:, :2]) <= [180, 90]).all() for guide in guides):
@@ -288,10 +288,10 @@ def _check_degrees(request: Request, guides: Sequence[Guide]) -> None:
         )
 
 
-def _axes(guides: Sequence[Guide], request: Request) -> tuple[list[Guide], list[Polyline], list[str]]:
+def _axes(guides: Sequence[GuideLine], request: Request) -> tuple[list[GuideLine], list[Polyline], list[str]]:
     """Return the guides that are long enough, their axes in metres, and a sentence on those that are not."""
-    kept: list[tuple[Guide, Polyline]] = []
-    short: list[tuple[Guide, float]] = []
+    kept: list[tuple[GuideLine, Polyline]] = []
+    short: list[tuple[GuideLine, float]] = []
     for guide in guides:
         xy = request.zero.to_local(np.column_stack([guide.xy[:, :2], np.zeros(len(guide.xy))]))[:, :2]
         xy = xy[np.append(True, np.hypot(*np.diff(xy, axis=0).T) > 0)]
@@ -337,7 +337,7 @@ def _check_inside(request: Request, axes: Sequence[Polyline], reach_m: float) ->
 
 def fit_square(
     files: Sequence[str],
-    pieces: Sequence[Piece],
+    pieces: Sequence[GuidePart],
     spacings_m: Sequence[float],
     parameters: AirborneParameters,
     context: Context,
@@ -380,20 +380,20 @@ def _shown_otherwise(
     return shown_m
 
 
-def _moved(fitted: Fitted, origin: np.ndarray, piece: Piece) -> Fitted:
+def _moved(fitted: Fitted, origin: np.ndarray, piece: GuidePart) -> Fitted:
     """Return the stations within the square, in metres from the zero of the coordinate system."""
     stations = fitted.stations
     own = (stations.t > piece.first_m) & (stations.t < piece.last_m)
     columns = {name: values[own] for name, values in vars(stations).items()}
     columns["xy"], columns["bed"] = columns["xy"] + origin[:2], columns["bed"] + origin[2]
     others = fitted.others[(fitted.others[:, 0] > piece.first_m) & (fitted.others[:, 0] < piece.last_m)]
-    return replace(fitted, stations=Stations(**columns), others=others)
+    return replace(fitted, stations=TrackStations(**columns), others=others)
 
 
 def _joined(
-    guide: Guide,
+    guide: GuideLine,
     axis: Polyline,
-    parts: Sequence[tuple[Piece, Fitted]],
+    parts: Sequence[tuple[GuidePart, Fitted]],
     spacing_m: float,
     rail_height_m: float,
     zero: LocalFrame,
@@ -417,7 +417,7 @@ def _joined(
     shift = zero.shift_to(frame)
     columns["xy"], columns["bed"] = columns["xy"] + shift[:2], columns["bed"] + shift[2]
     others = joined_others(np.concatenate([one.others for _, one in parts] or [np.empty((0, 2))]))
-    return track_of(guide, Stations(**columns), spacing_m, rail_height_m, frame, others)
+    return track_of(guide, TrackStations(**columns), spacing_m, rail_height_m, frame, others)
 
 
 def _frame(zero: LocalFrame, axes: Sequence[Polyline]) -> LocalFrame:

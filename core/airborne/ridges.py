@@ -40,7 +40,7 @@ EDGE_INSIDE_M = 0.15
 """Distance inside of the rail at which such an edge begins."""
 
 OUTLIER = 3.0
-"""Residual, in standard deviations, at which a bin has lost half of its weight."""
+"""Residual, in standard deviations, at which a bin, or a section of a curve, has lost 3/4 of its weight."""
 
 FLAT_LOSS = 0.45
 """Loss per bin of a bed that is flat but for noise; what is beyond counts against a place."""
@@ -85,7 +85,7 @@ EDGE_M = 0.01
 
 
 @dataclass(frozen=True)
-class Shape:
+class RidgeShape:
     """Ridges as they are expected, metres.
 
     `spacing_m` is the distance between the middles of the railheads, `width_m` the standard deviation of a ridge, and
@@ -106,7 +106,7 @@ class Shape:
         return (self.height_spread * self.height_m) ** -2
 
     @classmethod
-    def expected(cls, spacing_m: float, footprint_m: float) -> Shape:
+    def expected(cls, spacing_m: float, footprint_m: float) -> RidgeShape:
         """Return what a footprint makes of rails, before the cloud has been looked at."""
         width_m = max(MIN_WIDTH_M, footprint_m / 4 + HEAD_M)
         return cls(spacing_m, width_m, AREA_M2 / (NORMAL_AREA * width_m))
@@ -121,7 +121,7 @@ class Shape:
 
 
 @dataclass(frozen=True)
-class Fit:
+class RidgeFit:
     """Fits of two ridges at many places, arrays of one shape.
 
     `gain` is the log-likelihood of two rails above that of a bed without them, in which the smaller rail counts twice,
@@ -151,7 +151,7 @@ CHECKED = [
 """Pairs of columns whose products the models need, without and with the checks."""
 
 
-def fit(count: np.ndarray, height: np.ndarray, u: np.ndarray, shape: Shape, passes: int = 2) -> Fit:
+def fit(count: np.ndarray, height: np.ndarray, u: np.ndarray, shape: RidgeShape, passes: int = 2) -> RidgeFit:
     """Fit bed and ridges to bins at distances `u`, (k,), from a place: number and mean height of the points, (..., k).
 
     Of the robust weightings, `passes`, the first is that of clean bins.
@@ -171,10 +171,10 @@ def fit(count: np.ndarray, height: np.ndarray, u: np.ndarray, shape: Shape, pass
     flaw = np.maximum(loss - FLAT_LOSS * (count > 0).sum(axis=-1), 0.0)
     both, gain = normal.gains(shape)
     most = 0.5 * shape.height_m**2 * np.maximum(normal.product[BOTH, BOTH], 0.0)
-    return Fit(gain, both, flaw, most, bed[..., BOTH], bed[..., LEVEL] - 0.5 * bed[..., BOWED], bed[..., TILTED])
+    return RidgeFit(gain, both, flaw, most, bed[..., BOTH], bed[..., LEVEL] - 0.5 * bed[..., BOWED], bed[..., TILTED])
 
 
-def _columns(u: np.ndarray, shape: Shape) -> np.ndarray:
+def _columns(u: np.ndarray, shape: RidgeShape) -> np.ndarray:
     """Return the columns of the models at distances from the middle, (10, k)."""
     left, right = shape.ridge(u, 1), shape.ridge(u, -1)
     bow = u * u - 0.5
@@ -213,7 +213,7 @@ class _Normal:
         for one, other in self._rest:
             product[one, other] = product[one, other] - share[one] * product[pivot, other]
 
-    def bed(self, shape: Shape) -> np.ndarray:
+    def bed(self, shape: RidgeShape) -> np.ndarray:
         """Return level, tilt and bow of the bed and the height of the ridges, (..., 4)."""
         stiff = shape.stiffness
         found = {BOTH: (self.data[BOTH] + stiff * shape.height_m) / (self.product[BOTH, BOTH] + stiff)}
@@ -222,7 +222,7 @@ class _Normal:
             found[number] = (self.data[number] - known) / self.product[number, number]
         return np.stack([found[number] for number in range(BOTH + 1)], axis=-1)
 
-    def gains(self, shape: Shape) -> tuple[np.ndarray, np.ndarray]:
+    def gains(self, shape: RidgeShape) -> tuple[np.ndarray, np.ndarray]:
         """Return the gain of two rails, and that which remains after all checks."""
         stiff, height_m = shape.stiffness, shape.height_m
         none = 0.5 * stiff * height_m**2
@@ -275,7 +275,7 @@ class Sections:
 
     offset: np.ndarray
     sigma: np.ndarray
-    found: Fit
+    found: RidgeFit
     points: np.ndarray
     shows: np.ndarray
 
@@ -284,7 +284,7 @@ class Sections:
         return float(line.t[0]) + (np.arange(len(self.shows)) + 0.5) * STATION_M
 
 
-def measure(corridor: Corridor, shape: Shape, shows: np.ndarray | None) -> tuple[Shape, float]:
+def measure(corridor: Corridor, shape: RidgeShape, shows: np.ndarray | None) -> tuple[RidgeShape, float]:
     """Return the ridges that the profile of a whole line shows, and the distance of the rails if it is another one."""
     near = np.abs(corridor.across) < HALF_M
     if shows is not None and shows.any():
@@ -300,11 +300,13 @@ def measure(corridor: Corridor, shape: Shape, shows: np.ndarray | None) -> tuple
     height_m = float(np.clip(fits[best].height[0], LOWEST * shape.height_m, HIGHEST * shape.height_m))
     residual = height - mean[0][np.clip(np.floor((across + HALF_M) / PROFILE_BIN_M).astype(np.int64), 0, bins - 1)]
     noise_m = 1.4826 * float(np.median(np.abs(residual - np.median(residual)))) if len(residual) else shape.noise_m
-    found = Shape(shape.spacing_m, tried[best].width_m, height_m, max(noise_m, 0.01), SECTION_ROUGH_M, SECTION_SPREAD)
+    found = RidgeShape(
+        shape.spacing_m, tried[best].width_m, height_m, max(noise_m, 0.01), SECTION_ROUGH_M, SECTION_SPREAD
+    )
     return found, _other_spacing(count, mean, u, tried[best])
 
 
-def _other_spacing(count: np.ndarray, mean: np.ndarray, u: np.ndarray, shape: Shape) -> float:
+def _other_spacing(count: np.ndarray, mean: np.ndarray, u: np.ndarray, shape: RidgeShape) -> float:
     """Return the distance of the rails that a profile shows where it is clearly not the expected one, else NaN."""
     gains = [
         float(fit(count, mean, u, replace(shape, spacing_m=shape.spacing_m + more)).both[0]) for more in SPACINGS_M
@@ -314,7 +316,7 @@ def _other_spacing(count: np.ndarray, mean: np.ndarray, u: np.ndarray, shape: Sh
     return float(shape.spacing_m + SPACINGS_M[best]) if clearly and abs(SPACINGS_M[best]) > OTHER_M else np.nan
 
 
-def fit_sections(corridor: Corridor, shape: Shape, reach_m: float, length_m: float = STATION_M) -> Sections:
+def fit_sections(corridor: Corridor, shape: RidgeShape, reach_m: float, length_m: float = STATION_M) -> Sections:
     """Fit the middle of the track in every section."""
     half, aside = int(round(HALF_M / BIN_M)), int(round(reach_m / BIN_M))
     width, places = 2 * half + 1, 2 * aside + 1
@@ -330,7 +332,7 @@ def fit_sections(corridor: Corridor, shape: Shape, reach_m: float, length_m: flo
     offset = place[middle] + np.clip(leant / sharp, -PARABOLA * BIN_M, PARABOLA * BIN_M)
     at = np.clip(np.rint(offset / BIN_M).astype(np.int64) + aside, 0, places - 1)
     points = windows(count, width)[rows, at].sum(axis=1)
-    here = Fit(
+    here = RidgeFit(
         *(getattr(found, name)[rows, at] for name in ("gain", "both", "flaw", "most", "height", "level", "tilt"))
     )
     together = np.convolve(here.both, np.ones(3))[1:-1]

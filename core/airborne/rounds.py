@@ -11,16 +11,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..polyline import Polyline
-from .curves import FIRST_TURN_M, Curve, differences, draw_together, smooth
+from .curves import FIRST_TURN_M, TrackCurve, differences, draw_together, smooth
 from .guide_line import STEP_M as VERTEX_M
-from .guide_line import Corridor, Points, gather
+from .guide_line import Corridor, GuidePoints, gather
 from .ridges import (
     ENOUGH_GAIN,
     HALF_M,
     LEAST_SIGMA_M,
     STATION_M,
+    RidgeShape,
     Sections,
-    Shape,
     binned,
     fit,
     fit_sections,
@@ -59,7 +59,7 @@ SHIFT_LENGTH_M, STRIP_SHIFT_M = 50.0, 0.1
 class Beside:
     """Places `across`, (c,), to the left of a line and on it, for the `LONG` sections around each section.
 
-    `gain`, `flaw` and `most`, (n, c), are those of `ridges.Fit`.
+    `gain`, `flaw` and `most`, (n, c), are those of `ridges.RidgeFit`.
     """
 
     across: np.ndarray
@@ -94,7 +94,7 @@ class Beside:
         return self.score[:, (apart > low_m) & (apart < high_m)].max(axis=1)
 
 
-def look_beside(corridor: Corridor, shape: Shape, sections: int) -> Beside:
+def look_beside(corridor: Corridor, shape: RidgeShape, sections: int) -> Beside:
     """Compare the places beside a line, whose corridor reaches `WIDE_M` and half the width of a bed farther.
 
     Stones and sleepers differ from section to section, so that averaging removes more of them over many.
@@ -124,12 +124,12 @@ def _around(values: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Traced:
-    """A track whose course, `across` as in `search.Course`, is known to half a metre, and its ridges as expected."""
+    """A track whose course, `across` as in `search.GuideCourse`, is known to half a metre; its ridges as expected."""
 
-    points: Points
+    points: GuidePoints
     guide: Polyline
     across: np.ndarray
-    shape: Shape
+    shape: RidgeShape
 
 
 @dataclass(frozen=True)
@@ -141,7 +141,7 @@ class Seen:
 
     axis: Polyline
     corridor: Corridor
-    shape: Shape
+    shape: RidgeShape
     shown_m: float
     sections: Sections
 
@@ -159,7 +159,7 @@ class Refined:
     """
 
     seen: Seen
-    curve: Curve
+    curve: TrackCurve
     line: Polyline
     bed: np.ndarray
     sigma_bed: np.ndarray
@@ -173,7 +173,7 @@ class Refined:
 def refine(tracks: Sequence[Traced]) -> list[Refined | None]:
     """Fit the curves of parallel tracks; None for those of which no section shows a track."""
     lines = {number: _first(track) for number, track in enumerate(tracks)}
-    found: dict[int, tuple[Seen, Curve, Polyline]] = {}
+    found: dict[int, tuple[Seen, TrackCurve, Polyline]] = {}
     for reach_m in REACHES_M:
         seen: dict[int, Seen] = {}
         for number, line in lines.items():
@@ -210,7 +210,7 @@ def _look(track: Traced, line: Polyline, last: Seen | None, reach_m: float) -> S
     return Seen(line, corridor, shape, shown_m, sections) if sections.shows.any() else None
 
 
-def _with_heights(seen: Seen, curve: Curve, line: Polyline) -> Refined:
+def _with_heights(seen: Seen, curve: TrackCurve, line: Polyline) -> Refined:
     """Smooth the heights of the bed as well."""
     sections = seen.sections
     level = sections.found.level + seen.corridor.level_at(seen.t)

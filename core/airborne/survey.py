@@ -13,8 +13,8 @@ from ..frame import LocalFrame
 from ..parameters import AirborneParameters
 from ..polyline import length_along
 from ..standards import GAUGE_RANGE_MM, STANDARDS
-from .fitting import BED_SIGMA_M, REASONS, SEEN, Fitted, Stations
-from .ridges import STATION_M, Shape
+from .fitting import BED_SIGMA_M, REASONS, SEEN, Fitted, TrackStations
+from .ridges import STATION_M, RidgeShape
 
 MAX_UNSEEN_M, LEAST_STATIONS = 30.0, 3
 """A line ends where its track is not seen for longer, and is none with fewer stations that are."""
@@ -54,7 +54,7 @@ FEW_GUIDES = 5
 
 
 @dataclass(frozen=True)
-class Guide:
+class GuideLine:
     """A line, `xy` (n, 2) in units of the cloud's coordinate system, that says which track is meant.
 
     `gauge_m` is the gauge of this track, such as OpenStreetMap states it; None for that of the run. `name` and `ref`
@@ -119,7 +119,7 @@ class AirborneTrack:
         Why a station is not seen; empty where it is.
     """
 
-    guide: Guide
+    guide: GuideLine
     track_id: np.ndarray
     xyz: np.ndarray
     s_m: np.ndarray
@@ -168,7 +168,7 @@ class AirborneLine:
 
 
 @dataclass(frozen=True)
-class Survey:
+class AirborneSurvey:
     """What a run has found: a track for each guide, its lines, and the points per square metre along the guides."""
 
     tracks: tuple[AirborneTrack, ...]
@@ -189,8 +189,8 @@ class Survey:
 
 
 def track_of(
-    guide: Guide,
-    stations: Stations,
+    guide: GuideLine,
+    stations: TrackStations,
     spacing_m: float,
     rail_height_m: float,
     frame: LocalFrame,
@@ -348,7 +348,7 @@ def on_shapes(found: Sequence[Fitted], parameters: AirborneParameters, spacings_
     if not shapes:
         return []
     width_m = float(np.median([shape.width_m for shape in shapes]))
-    expected_m = Shape.expected(spacings_m[0], parameters.footprint_m).width_m
+    expected_m = RidgeShape.expected(spacings_m[0], parameters.footprint_m).width_m
     if width_m < WIDE_RIDGES * expected_m:
         return []
     return [
@@ -357,7 +357,9 @@ def on_shapes(found: Sequence[Fitted], parameters: AirborneParameters, spacings_
     ]
 
 
-def on_gauges(guides: Sequence[Guide], fitted: Sequence[Sequence[Fitted]], parameters: AirborneParameters) -> list[str]:
+def on_gauges(
+    guides: Sequence[GuideLine], fitted: Sequence[Sequence[Fitted]], parameters: AirborneParameters
+) -> list[str]:
     """Warn of guides along which rails at another gauge show, one sentence for those that share both gauges."""
     wrong: dict[tuple[int, int, bool], list[int]] = {}
     for guide, parts in zip(guides, fitted):

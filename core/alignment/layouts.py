@@ -19,7 +19,7 @@ from ..progress import SILENT, Progress
 from .chain import NOTHING, Chain, Held, Span, Unknowns, assembled
 from .elements import Alignment, CantElement, Element, Figures, PlanElement, VerticalElement
 from .noise import Noise, estimated, shared_covariance
-from .plane_fit import FitError, PlanFit, Points, fit_plan
+from .plane_fit import FitError, MeasuredLine, PlanFit, fit_plan
 from .signals import FINAL_ROUNDS, FLOOR_M, PLAN, STILL_M, Signal, refitted, started
 from .structure import is_within
 
@@ -143,7 +143,7 @@ class Errors:
     s: np.ndarray
 
 
-def remaining(fit: PlanFit, points: Points, tolerance_m: float) -> Noise:
+def remaining(fit: PlanFit, points: MeasuredLine, tolerance_m: float) -> Noise:
     """Return the noise that explains the distances of the points from the fitted curve."""
     ends = np.searchsorted(fit.s, [one.s_to for one in fit.elements[:-1]])
     parts = [slice(first, last) for first, last in zip([0, *ends], [*ends, len(fit.s)])]
@@ -165,7 +165,7 @@ def _spent(jacobian: sparse.csr_matrix, weight: np.ndarray, covariance: np.ndarr
     return float(np.einsum("i,ij,jk,ik->", weight, rows, covariance[np.ix_(which, which)], rows, optimize=True))
 
 
-def plan_errors(fit: PlanFit, points: Points, used_m: float, noise: Noise) -> Errors:
+def plan_errors(fit: PlanFit, points: MeasuredLine, used_m: float, noise: Noise) -> Errors:
     """Return standard errors of the elements in plan, given the one for which points were weighted and their noise."""
     count = len(fit.elements)
     bends = fit.jacobian.shape[1] - 4 * count
@@ -334,7 +334,7 @@ MOST_RISE = 6.6
 
 
 def with_round_radii(
-    chain: Chain, points: Points, fit: PlanFit, elements: Sequence[PlanElement], progress: Progress = SILENT
+    chain: Chain, points: MeasuredLine, fit: PlanFit, elements: Sequence[PlanElement], progress: Progress = SILENT
 ) -> tuple[PlanElement, ...]:
     """Return elements with proposed round radii, and how far the track lies off with all of them."""
     parts = np.flatnonzero(chain.extents[1] > chain.extents[0])
@@ -376,7 +376,7 @@ def round_radius(one: PlanElement, sigmas: float) -> Optional[float]:
     return None
 
 
-def off_element(fit: PlanFit, points: Points, number: int) -> tuple[Optional[float], Optional[float]]:
+def off_element(fit: PlanFit, points: MeasuredLine, number: int) -> tuple[Optional[float], Optional[float]]:
     """Return the root mean square and the largest deviation of the points of an element, millimetres."""
     one = fit.elements[number]
     first, last = one.s_from if number else -np.inf, one.s_to if number + 1 < len(fit.elements) else np.inf
@@ -386,5 +386,5 @@ def off_element(fit: PlanFit, points: Points, number: int) -> tuple[Optional[flo
     return float(np.sqrt(np.mean(rest**2))), float(rest[np.abs(rest).argmax()])
 
 
-def _chi_square(fit: PlanFit, points: Points) -> float:
+def _chi_square(fit: PlanFit, points: MeasuredLine) -> float:
     return float(points.weight @ fit.across**2)

@@ -29,7 +29,7 @@ from ..run.loop import Runner
 from ..run.processes import workers
 
 if TYPE_CHECKING:
-    from ..jobs.features import Source
+    from ..jobs.features import FeatureSource
     from ..jobs.result import Rasters
 
 Spell = Callable[[Parameter], str]
@@ -40,21 +40,10 @@ LAYERS, PAGES, RASTERS = (".gpkg", ".dxf", ".csv"), (".html", ".htm"), (".tif", 
 
 
 class FileValues(Values):
-    """Values of the parameters of one run of a job.
+    """Values of the parameters of one run of a job: values and files by name; None, or none, where one is left empty.
 
-    Parameters
-    ----------
-    given : mapping of str to object
-        Values and files by the name of the parameter or output; None, or none, where one is left empty.
-    command : str
-        What repeats the run.
-    keeps : bool
-        Whether the result stays after the run.
-
-    Raises
-    ------
-    ParameterError, DiskError
-        A value is wrong, or an output could not be written after the run.
+    `command` repeats the run, and `keeps` says whether the result stays after it. Raises ParameterError if a value is
+    wrong, and DiskError if an output could not be written after the run.
     """
 
     def __init__(self, job: Job, given: Mapping[str, Any], command: str, keeps: bool = False) -> None:
@@ -137,7 +126,7 @@ class FileValues(Values):
         """Return the places of SEED, which are in the coordinate system of the cloud."""
         return [np.array([place]) for place in self["SEED"]]
 
-    def source(self, name: str) -> Source:
+    def source(self, name: str) -> FeatureSource:
         """Return a layer of a file."""
         return self.once(name, lambda: vector_module(name).read_features(self[name], name, name == "AXIS"))
 
@@ -145,17 +134,8 @@ class FileValues(Values):
 def run_with_files(job: Job, make: Callable[[], FileValues], progress: Progress, spell: Spell) -> Result:
     """Run a job and write the outputs that were given; one that fails does not stop the others.
 
-    Parameters
-    ----------
-    make : callable
-        Returns the values.
-    spell : callable
-        Returns how messages name a parameter.
-
-    Raises
-    ------
-    RailExtractError
-        A value is wrong, or an output could not be written.
+    `make` returns the values, and `spell` how messages name a parameter. Raises RailExtractError if a value is wrong,
+    or an output could not be written.
     """
     try:
         values = make()
@@ -207,13 +187,7 @@ def _write_page(destination: Destination, make: Callable[[], str]) -> None:
 
 
 def read_value(one: Parameter, given: Any) -> Any:
-    """Return the value of a parameter that was given, its default if nothing was.
-
-    Raises
-    ------
-    ParameterError
-        It is wrong, or missing.
-    """
+    """Return the value of a parameter that was given, its default if nothing was."""
     if given is None or (isinstance(given, str) and not given):
         if one.required:
             raise ParameterError(one.refusal(None))
@@ -293,13 +267,7 @@ READERS: dict[type, Callable[[Any, Any], Any]] = {
 
 
 def check_packages(one: kinds.Output) -> None:
-    """Check before a run that an output can be written.
-
-    Raises
-    ------
-    ParameterError
-        A package is not installed.
-    """
+    """Check before a run that an output can be written, with the packages that are installed."""
     if isinstance(one, kinds.LayerOutput):
         vector_module(one.name, ".files.writing")
     elif isinstance(one, kinds.RasterOutput):
@@ -315,10 +283,7 @@ def check_rasterio(name: str) -> None:
 def destinations_of(job: Job, files: Mapping[str, Path]) -> dict[str, Destination]:
     """Check that outputs can be written, make their folders, and return their destinations.
 
-    Raises
-    ------
-    ParameterError, DiskError
-        A required output is missing, one could not be written after the run, or two are the same file.
+    Raises an error if a required output is missing, one could not be written after the run, or two are the same file.
     """
     found: dict[str, Destination] = {}
     shared: dict[Path, Destination] = {}

@@ -24,7 +24,7 @@ from ..kernels import Library, one_thread, threads
 from ..progress import Progress
 from . import AUTO, START, STATISTICS
 from .architecture import from_blocks, into_blocks
-from .corridor import MAX_PIECE_CELLS, Piece
+from .corridor import MAX_PIECE_CELLS, Rectangle
 
 Array = Any
 """(channels, height, width) array of the library that computes."""
@@ -66,7 +66,7 @@ class Engine(ABC):
         seen: Sequence[np.ndarray],
         known: Sequence[np.ndarray],
         number: int,
-        pieces: Sequence[Piece],
+        pieces: Sequence[Rectangle],
         progress: Progress,
     ) -> list[np.ndarray]:
         """Run the pass of a number, from 0, over pieces, which do not overlap, of a raster that is empty elsewhere.

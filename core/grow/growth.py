@@ -16,7 +16,7 @@ from scipy.spatial import cKDTree
 
 from ..polyline import Polyline, runs
 from ..progress import SILENT, Progress
-from .heads import MIN_POINTS, GrowSettings, Head, OnHeads, Rail, heads_in
+from .heads import MIN_POINTS, GrowSettings, OnHeads, Rail, SeenHead, heads_in
 from .start import GAUGE_OFF_M, LEAST_RADIUS_M, Ahead, Start, find_start, lead, smoothed, window_m
 
 LEAST_SHARE = 0.25
@@ -70,13 +70,13 @@ class Reason(Enum):
 
 
 @dataclass(frozen=True)
-class Window:
+class SeenWindow:
     """What was seen at a place: the head of the rail and that of the other rail, and the places on their axes, (3,)."""
 
     xyz: np.ndarray
-    head: Head | None
+    head: SeenHead | None
     other_xyz: np.ndarray
-    other: Head | None
+    other: SeenHead | None
 
     @property
     def is_seen(self) -> bool:
@@ -84,7 +84,7 @@ class Window:
         return self.head is not None or self.other is not None
 
 
-Pair = tuple[Optional[Head], Optional[Head]]
+Pair = tuple[Optional[SeenHead], Optional[SeenHead]]
 """The rail, and the other rail of its track; None where it is not seen."""
 
 
@@ -102,14 +102,14 @@ class _Track:
 
 def follow(
     points: OnHeads, start: Start, behind: np.ndarray, settings: GrowSettings, progress: Progress = SILENT
-) -> tuple[list[Window], Reason]:
+) -> tuple[list[SeenWindow], Reason]:
     """Follow a rail in one direction, from a start that was `turned` to it, to the last window that shows a rail.
 
     `behind`, (n, 3), are places on the axis up to where it begins, in order.
     """
     walk = _Walk(points, start, settings)
     parameters = settings.parameters
-    windows: list[Window] = []
+    windows: list[SeenWindow] = []
     heading, places = start.heading, list(behind)
     reason = Reason.LENGTH
     shown = math.ceil(COURSE * start.beam.fit_m / parameters.window_m) + len(behind)
@@ -139,7 +139,7 @@ class _Walk:
         self._points, self._start, self._settings = points, start, settings
         self.track = _Track([start.per_m], [start.per_m], level_m=start.level_m)
 
-    def see(self, ahead: Ahead) -> Window | None:
+    def see(self, ahead: Ahead) -> SeenWindow | None:
         """Look at a window; None where two rails continue the rail."""
         track = self.track
         off_m = self._start.side * self._settings.spacing_m + self._widening_m()
@@ -162,7 +162,7 @@ class _Walk:
             track.off_m.append(off_m - self._start.side * self._settings.spacing_m + other.across_m - head.across_m)
             track.level_m += other.top_m - head.top_m
         self._remember(head, other)
-        return Window(xyz, head, other_xyz, other)
+        return SeenWindow(xyz, head, other_xyz, other)
 
     def failure(self, ahead: Ahead) -> Reason:
         """Say why no head is seen."""
@@ -178,7 +178,7 @@ class _Walk:
             return Reason.COVERED
         return Reason.FLUSH if on >= self._least(self.track.per_m) else Reason.HEAD
 
-    def is_full(self, window: Window) -> bool:
+    def is_full(self, window: SeenWindow) -> bool:
         """Return whether a rail was seen over half of a window or more: at the end of a cloud it may be less."""
         pairs = ((window.head, self.track.per_m), (window.other, self.track.other_per_m))
         return any(head is not None and head.count >= self._least(usual, HALF) for head, usual in pairs)
@@ -187,7 +187,7 @@ class _Walk:
         """Return how far the other rail was to the left of its nominal place."""
         return float(np.median(self.track.off_m[-MEMORY:])) if self.track.off_m else 0.0
 
-    def _remember(self, head: Head | None, other: Head | None) -> None:
+    def _remember(self, head: SeenHead | None, other: SeenHead | None) -> None:
         """Take note of what was seen."""
         track = self.track
         for one, per_m in ((head, track.per_m), (other, track.other_per_m)):
@@ -200,7 +200,7 @@ class _Walk:
         """Return the length of a window."""
         return window_m(float(np.median(per_m[-MEMORY:])), self._settings)
 
-    def _heads(self, ahead: Ahead, per_m: list[float]) -> list[Head]:
+    def _heads(self, ahead: Ahead, per_m: list[float]) -> list[SeenHead]:
         """List the heads near a place."""
         length_m, reach_m = self._length_m(per_m), self._settings.parameters.search_m + BESIDE_M
         along, across, height = ahead.coordinates(self._points.around(ahead.xy, np.hypot(reach_m, length_m / 2)))
@@ -223,7 +223,7 @@ class _Walk:
         """Return the least number of points of a head."""
         return max(share * float(np.median(per_m[-MEMORY:])) * self._length_m(per_m), MIN_POINTS)
 
-    def _candidates(self, ahead: Ahead) -> list[Head]:
+    def _candidates(self, ahead: Ahead) -> list[SeenHead]:
         """List the heads that may continue the rail."""
         gate_m, rise_m = self._gate_m(), self._rise_m(self.track.unseen)
         found = self._heads(ahead, self.track.per_m)
@@ -247,7 +247,7 @@ class _Walk:
             return abs(head.across_m) + abs(other.across_m - head.across_m)
         return sum(abs(one.across_m) for one in pair if one) + (self._missing_m() if self._start.side else 0.0)
 
-    def _other(self, others: list[Head], head: Head | None) -> Head | None:
+    def _other(self, others: list[SeenHead], head: SeenHead | None) -> SeenHead | None:
         """Choose the other rail at the gauge from a head, or, without one, from the expected course."""
         track, side = self.track, self._start.side
         left_m, up_m = (head.across_m, head.top_m) if head else (0.0, 0.0)
@@ -262,7 +262,7 @@ class _Walk:
         return min(found, key=lambda one: abs(one.across_m - left_m), default=None)
 
 
-def _place(ahead: Ahead, head: Head | None) -> np.ndarray:
+def _place(ahead: Ahead, head: SeenHead | None) -> np.ndarray:
     """Return the place of a head, (3,), or that of the expected course."""
     left_m, up_m = (head.across_m, head.top_m) if head else (0.0, 0.0)
     return np.append(ahead.xy + left_m * ahead.left, ahead.z + up_m)
@@ -308,7 +308,7 @@ def grow_from(points: OnHeads, start: Start, settings: GrowSettings, progress: P
     return Growth(rails, stops) if rails else None
 
 
-def _beyond(start: Start, onwards: Sequence[Window], settings: GrowSettings) -> np.ndarray:
+def _beyond(start: Start, onwards: Sequence[SeenWindow], settings: GrowSettings) -> np.ndarray:
     """Return the places in front of the way back, in its order."""
     count = int(start.beam.fit_m / settings.parameters.window_m)
     if len(onwards) >= count:
@@ -317,7 +317,7 @@ def _beyond(start: Start, onwards: Sequence[Window], settings: GrowSettings) -> 
     return start.xyz[-1] + np.arange(count, 0, -1)[:, None] * step
 
 
-def _rail(windows: Sequence[Window], is_other: bool, start: Start, settings: GrowSettings) -> Rail | None:
+def _rail(windows: Sequence[SeenWindow], is_other: bool, start: Start, settings: GrowSettings) -> Rail | None:
     """Make one of the rails of a track, from the first window in which it was seen to the last."""
     heads = [window.other if is_other else window.head for window in windows]
     own = np.flatnonzero([head is not None for head in heads])

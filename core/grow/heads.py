@@ -113,7 +113,7 @@ class GrowSettings:
 
 
 @dataclass(frozen=True)
-class Head:
+class SeenHead:
     """A head in a window: place of its axis to the left, height of its top, and number of points on it.
 
     It is `alone` if no other head touches it.
@@ -144,7 +144,7 @@ class Rail:
 
 def heads_in(
     across_m: np.ndarray, height_m: np.ndarray, settings: GrowSettings, beam: Beam, least: float = MIN_POINTS
-) -> list[Head]:
+) -> list[SeenHead]:
     """List the heads in a window with as many points or more: one for each group of points, or two that touch.
 
     Points on heads are given by places across and heights, (n,) each.
@@ -157,7 +157,7 @@ def heads_in(
     return [head for head in found if head.count >= least]
 
 
-def _heads_of(across_m: np.ndarray, height_m: np.ndarray, half_m: float, beam: Beam) -> list[Head]:
+def _heads_of(across_m: np.ndarray, height_m: np.ndarray, half_m: float, beam: Beam) -> list[SeenHead]:
     """Measure the head that a group of points is on, or the two at its sides if it is wider."""
     spare_m = (across_m[-1] - across_m[0]) / 2 - half_m - beam.beside_m
     if spare_m <= 0:
@@ -170,7 +170,7 @@ def _heads_of(across_m: np.ndarray, height_m: np.ndarray, half_m: float, beam: B
         off = np.abs(across_m - place_m)
         crown = height_m[off <= CROWN_SHARE * half_m]
         top_m = float(np.median(crown if len(crown) else height_m))
-        heads.append(Head(place_m, top_m, int((off <= half_m + beam.beside_m).sum()), len(places) == 1))
+        heads.append(SeenHead(place_m, top_m, int((off <= half_m + beam.beside_m).sum()), len(places) == 1))
     return heads
 
 

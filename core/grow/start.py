@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .heads import DENSE, Beam, GrowSettings, Head, OnHeads, heads_in
+from .heads import DENSE, Beam, GrowSettings, OnHeads, SeenHead, heads_in
 
 LEAST_RADIUS_M = 20.0
 """Least radius of a railway: trams; a course can't leave the expected one faster."""
@@ -206,7 +206,7 @@ def _per_m(near: np.ndarray, ahead: Ahead, reach_m: float, settings: GrowSetting
 
 def _windows(
     near: np.ndarray, ahead: Ahead, reach_m: float, beam: Beam, settings: GrowSettings
-) -> tuple[np.ndarray, list[Head]]:
+) -> tuple[np.ndarray, list[SeenHead]]:
     """Measure the head in five windows along a line; returns the places along and the heads of those that show it."""
     along, across, height = ahead.coordinates(near)
     stations, heads = [], []
@@ -221,7 +221,7 @@ def _windows(
     return np.array(stations), heads
 
 
-def _aligned(ahead: Ahead, stations: np.ndarray, heads: list[Head]) -> Ahead:
+def _aligned(ahead: Ahead, stations: np.ndarray, heads: list[SeenHead]) -> Ahead:
     """Lay a line through heads."""
     slope, offset = np.polyfit(stations, [head.across_m for head in heads], 1)
     grade, top = np.polyfit(stations, [head.top_m for head in heads], 1)

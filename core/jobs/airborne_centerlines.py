@@ -27,7 +27,7 @@ from .declaration import (
 from .values import class_numbers
 
 if TYPE_CHECKING:
-    from ..airborne.survey import Survey
+    from ..airborne.survey import AirborneSurvey
     from ..progress import Progress
     from .result import Result
     from .values import Values
@@ -71,7 +71,7 @@ def _run(values: Values, progress: Progress) -> Result:
     return replace(made, cloud=ShownCloud("INPUT", codes, standard.head_width_m))
 
 
-def _fitted(survey: Survey, values: Values) -> Result:
+def _fitted(survey: AirborneSurvey, values: Values) -> Result:
     """Return what was found along the guides as a result."""
     from ..files.layers import airborne_stations_layer, findings_layer, lines_layer
     from ..report.airborne import airborne_findings, airborne_page, airborne_summary

@@ -13,7 +13,7 @@ from .declaration import CLOUD_NEEDS, CLOUD_WORDS, RAIL_WORDS, RAW_CLOUDS, Flag,
 
 if TYPE_CHECKING:
     from ..clouds.points import Request
-    from ..labelling.files import Result as Found
+    from ..labelling.files import ClassifiedFiles
     from ..progress import Progress
     from .result import Result
     from .values import Values
@@ -36,12 +36,12 @@ def _run(values: Values, progress: Progress) -> Result:
     """Classify the cloud and write the copy."""
     from ..checks.standard import warn_of_raw
     from ..classify.settings import Settings
-    from ..labelling.files import Choice, classify_files, plan_output
+    from ..labelling.files import Content, classify_files, plan_output
     from ..labelling.finding import guide_of
 
     progress, standard = Estimating(progress), values.standard()
     gauges_m = (standard.gauge_m, *(gauge_m for gauge_m, _ in values.other_gauges(standard)))
-    choice = Choice(values["RAIL_CLASS"], values.rails_only(), values["RESET"])
+    choice = Content(values["RAIL_CLASS"], values.rails_only(), values["RESET"])
     output = plan_output(values.cloud().paths, values.path("OUTPUT"), choice.class_code, progress)
     request, guide = values.request(SEARCHED_CLASSES, progress), None
     if values.filled("GUIDE"):
@@ -55,7 +55,7 @@ def _run(values: Values, progress: Progress) -> Result:
     return classified(found, request)
 
 
-def classified(found: Found, request: Request) -> Result:
+def classified(found: ClassifiedFiles, request: Request) -> Result:
     """Return the result of a job that writes a classified copy."""
     from .result import Result
 

@@ -115,12 +115,12 @@ def _run(values: Values, progress: Progress) -> Result:
     """Follow the rails and write the copy."""
     from ..files.layers import stops_layer
     from ..grow.heads import GrowSettings
-    from ..labelling.files import Choice, plan_output
+    from ..labelling.files import Content, plan_output
     from ..labelling.growing import grow_files
     from ..run.loop import Runner
 
     progress, standard = Estimating(progress), values.standard()
-    choice = Choice(values["RAIL_CLASS"], values.rails_only(), reset=False)
+    choice = Content(values["RAIL_CLASS"], values.rails_only(), reset=False)
     output = plan_output(values.cloud().paths, values.path("OUTPUT"), choice.class_code, progress)
     request = values.request(SEARCHED_CLASSES, progress)
     settings = GrowSettings(standard.gauge_m, standard.head_width_m, values.growth())

@@ -38,7 +38,7 @@ MAX_WHOLE, ID = 2**31 - 1, re.compile(r"\s*\d{1,10}\s*")
 
 
 @dataclass(frozen=True)
-class Lines:
+class LayerLines:
     """The parts of all lines of a layer, each a line of its own.
 
     A part is its feature, the values by field, and the vertices, (n, 3) local metres; z is NaN without heights.
@@ -56,7 +56,7 @@ class Lines:
         fields: Collection[str],
         system: tuple[str | None, float, float],
         progress: Progress,
-    ) -> Lines:
+    ) -> LayerLines:
         """Check the lines of a layer, and put them into a local frame; `system` is that of `system_of`.
 
         `name` is that of the layer's parameter, for messages. Raises RailExtractError if there is no line, or one with

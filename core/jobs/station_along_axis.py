@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from ..kilometres.axes import PlacedAxes
     from ..progress import Progress
-    from .features import Places
+    from .features import PlacedFeatures
     from .result import Result
     from .values import Values
 
@@ -77,7 +77,7 @@ def _run(values: Values, progress: Progress) -> Result:
     )
 
 
-def _extents_km(places: Places, known: np.ndarray, axes: PlacedAxes, progress: Progress) -> list[np.ndarray]:
+def _extents_km(places: PlacedFeatures, known: np.ndarray, axes: PlacedAxes, progress: Progress) -> list[np.ndarray]:
     """Return the smallest and the largest kilometre of the vertices of features, (n,) each; NaN without any."""
     import numpy as np
 

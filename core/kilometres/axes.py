@@ -52,7 +52,7 @@ class Post:
 
 
 @dataclass(frozen=True)
-class Start:
+class AxisStart:
     """The kilometre at the first vertex of a line, and whether kilometres decrease along it."""
 
     km: float
@@ -68,7 +68,7 @@ class Axes:
 
 
 def make_axes(
-    lines: Sequence[AxisLine], start: Start | None = None, posts: Sequence[Post] = (), jumps: Sequence[Jump] = ()
+    lines: Sequence[AxisLine], start: AxisStart | None = None, posts: Sequence[Post] = (), jumps: Sequence[Jump] = ()
 ) -> Axes:
     """Give lines their kilometres by posts, else by a first kilometre, else by their M values.
 
@@ -97,7 +97,7 @@ def make_axes(
     return _told([_by_measures(line) for line in joined])
 
 
-def _check(lines: Sequence[AxisLine], start: Start | None, posts: Sequence[Post]) -> None:
+def _check(lines: Sequence[AxisLine], start: AxisStart | None, posts: Sequence[Post]) -> None:
     """Refuse lines, a start and posts that are on no railway; where they are read, kilometres are checked."""
     for number, line in enumerate(lines, start=1):
         where = f"The line {line.name or number} of AXIS"

@@ -66,8 +66,7 @@ def train_classifier(
     file, is removed once they are written. Raises NoRailPointsError or ParameterError if nothing can be learned from
     the labels, or the folder holds another training.
     """
-    from ..learned.training import Settings as TrainingSettings
-    from ..learned.training import train
+    from ..learned.training import TrainingSettings, train
 
     folder = folder_of(weights.file)
     reading, learning = progress.divide((READING, 1 - READING))

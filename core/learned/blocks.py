@@ -75,24 +75,13 @@ CHECKS = "checks.json"
 
 @dataclass(frozen=True)
 class Thinned:
-    """The points of a square that the network sees.
+    """The points of a square that the network sees, and the cells in which the bed was found.
 
-    Attributes
-    ----------
-    number : (n,) int array
-        Their numbers among the points of the square, in an order that depends on their places only.
-    place : (n, 4) float32 array
-        Metres from the square's corner, the height counting from a multiple of `ORIGIN_STEP`; height above the bed.
-    railhigh : (n,) bool array
-        Points in the zone of railheads; only these can be on rails.
-    band : (m,) int array
-        Numbers of all points of the square in the zone of railheads.
-    band_place : (m, 3) float32 array
-        Their places.
-    stands_for : (m,) int array
-        The thinned point of their cube, for each.
-    coarse : Coarse
-        The cells in which the bed was found.
+    `number`, (n,), are their numbers among the points of the square, in an order that depends on their places only.
+    `place`, (n, 4) float32, is in metres from the square's corner, the height counting from a multiple of
+    `ORIGIN_STEP`, and the height above the bed. `railhigh`, (n,), are points in the zone of railheads; only these can
+    be on rails. `band`, (m,), are the numbers of all points of the square in this zone, `band_place`, (m, 3), their
+    places, and `stands_for`, (m,), the thinned point of their cube.
     """
 
     number: np.ndarray
@@ -183,19 +172,12 @@ def centred(place: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class Layer:
+class PointLayer:
     """The points of a layer, those of all blocks behind each other.
 
-    Attributes
-    ----------
-    position : (n, 3) float32 array
-        Metres from the middle of the block.
-    near : (n, NEIGHBOURS) int64 array
-        Numbers of the nearest points of the same block. A block with fewer repeats them.
-    kept : (m,) int64 array
-        Numbers of the points that the next layer has.
-    nearest : (n,) int64 array
-        For each point, the nearest one of the next layer: its number there.
+    `position`, (n, 3) float32, is in metres from the middle of the block. `near`, (n, NEIGHBOURS), are the numbers of
+    the nearest points of the same block; a block with fewer repeats them. `kept`, (m,), are the numbers of the points
+    that the next layer has, and `nearest`, (n,), is the number there of the nearest one for each point.
     """
 
     position: np.ndarray
@@ -204,7 +186,7 @@ class Layer:
     nearest: np.ndarray
 
 
-def build(blocks: Sequence[np.ndarray]) -> list[Layer]:
+def build(blocks: Sequence[np.ndarray]) -> list[PointLayer]:
     """Find the neighbours of the points of blocks, (n, 3) each, on all layers."""
     layers = []
     for _ in range(LAYERS):
@@ -212,7 +194,7 @@ def build(blocks: Sequence[np.ndarray]) -> list[Layer]:
         starts = np.cumsum([0, *(len(part.position) for part in parts)])
         next_starts = np.cumsum([0, *(len(part.kept) for part in parts)])
         layers.append(
-            Layer(
+            PointLayer(
                 np.concatenate([part.position for part in parts]),
                 np.concatenate([part.near + start for part, start in zip(parts, starts)]),
                 np.concatenate([part.kept + start for part, start in zip(parts, starts)]),
@@ -223,14 +205,14 @@ def build(blocks: Sequence[np.ndarray]) -> list[Layer]:
     return layers
 
 
-def _layer(position: np.ndarray) -> Layer:
+def _layer(position: np.ndarray) -> PointLayer:
     """Find the neighbours within one block."""
     count = len(position)
     near = cKDTree(position).query(position, k=np.arange(1, min(NEIGHBOURS, count) + 1))[1]
     near = np.resize(near.T, (NEIGHBOURS, count)).T if count < NEIGHBOURS else near
     kept = np.arange(-(-count // RATIO))
     nearest = cKDTree(position[kept]).query(position)[1]
-    return Layer(position, near.astype(np.int64), kept, nearest.astype(np.int64))
+    return PointLayer(position, near.astype(np.int64), kept, nearest.astype(np.int64))
 
 
 @dataclass(frozen=True)

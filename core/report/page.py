@@ -23,7 +23,7 @@ from ..rails import ENOUGH_CELLS_PER_M, RailNetwork, SearchFigures
 from ..standards import Gauge, RailStandard
 from .limits import limits_table
 from .markup import figure, legend, made, note, page, section, table, tag, text, tiles, verdict_box
-from .plots import Course, draw_plan, draw_profiles, draw_strips
+from .plots import MapTrack, draw_plan, draw_profiles, draw_strips
 
 CLASSES_ADVICE = (
     "Rail classes: choose the class of the rails; in a raw cloud, which has none, have the rail points found."
@@ -91,10 +91,10 @@ def _of_all(findings: Findings) -> list[str]:
     return [plan, _findings(findings), _tracks(findings), limits]
 
 
-def _courses(findings: Findings) -> list[Course]:
+def _courses(findings: Findings) -> list[MapTrack]:
     """Return the tracks for the map, the most severe doubts on top."""
     return [
-        Course(
+        MapTrack(
             str(track.line.track_id),
             track.geometry.xyz,
             {doubt.name: track.doubtful[doubt] for doubt in reversed(DOUBTS)},

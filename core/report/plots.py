@@ -41,7 +41,7 @@ STRIP_SPAN_MM = 10.0
 """Smallest range of a panel of strips, so that noise does not look alarming."""
 
 STEP_M = 1.5
-"""Stations of strips further apart belong to different parts of a course: there is one for every metre."""
+"""Places further apart belong to different parts of a track: there is one for every metre."""
 
 
 @dataclass(frozen=True)
@@ -221,7 +221,7 @@ def _thinned(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 @dataclass(frozen=True)
-class Course:
+class MapTrack:
     """A track in the map: its stations, `xyz` (n, 3), and which of them have a mark, by the mark's CSS class.
 
     Later marks are drawn over earlier ones.
@@ -232,7 +232,7 @@ class Course:
     marks: Mapping[str, np.ndarray]
 
 
-def draw_plan(courses: Sequence[Course]) -> str:
+def draw_plan(courses: Sequence[MapTrack]) -> str:
     """Return the map as SVG, north up."""
     xy = np.concatenate([course.xyz[:, :2] for course in courses])
     low, span = xy.min(axis=0), np.maximum(np.ptp(xy, axis=0), 1.0)

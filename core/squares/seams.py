@@ -90,7 +90,7 @@ def rows_in_frame(part: SquareRails, frame: LocalFrame) -> np.ndarray:
 
 
 @dataclass
-class Piece:
+class RailPiece:
     """The part of a square's rail that no earlier square shows, in the common frame, between two chainages of the rail.
 
     `links` has, for each end, 0 or 1, the end of another piece that continues this one; ends that nothing continues are
@@ -231,7 +231,7 @@ class _Joiner:
     """Collects the new parts of the rails of square after square, and links parts that continue each other."""
 
     def __init__(self) -> None:
-        self._pieces: list[Piece] = []
+        self._pieces: list[RailPiece] = []
         self._rails: dict[Key, list[RailLine]] = {}
         self._numbers: dict[Key, list[int]] = {}
 
@@ -262,7 +262,7 @@ class _Joiner:
         self, rail: RailLine, start: float, end: float, cut: np.ndarray, on_rail: list[tuple[PieceEnd, float]]
     ) -> None:
         """Add a piece and link its cut ends to the open ends on its rail, given with their chainages."""
-        number, piece = len(self._pieces), Piece(rail, start, end)
+        number, piece = len(self._pieces), RailPiece(rail, start, end)
         self._pieces.append(piece)
         length = rail.line.length_m
         inner = [side for side, is_inner in enumerate((start > 0, end < length)) if is_inner]
@@ -322,7 +322,7 @@ class _Joiner:
         return part.reversed() if entered else part
 
 
-def _extend_to_end_of_rail(piece: Piece, side: int, length: float) -> None:
+def _extend_to_end_of_rail(piece: RailPiece, side: int, length: float) -> None:
     """Extend a piece to the end of its rail if the remaining part, which other squares show, is short."""
     rest = length - piece.end if side else piece.start
     if rest <= MAX_SHARED_M:

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..errors import NoTrackError
-from ..lines.ends import ARC, STRAIGHT, PartingLaw, left_of
+from ..lines.ends import ARC, ROUNDS, STRAIGHT, PartingLaw, left_of
 from ..lines.finishing import finished, united
 from ..lines.smoothing import STATIONS_PER_SIGMA, smooth_line
 from ..parameters import Parameters
@@ -23,7 +23,7 @@ from ..polyline import MIN_RING_M, Polyline
 from ..progress import SILENT, Progress
 from ..rails import Centerline, RailLine
 from ..standards import closest_standard, distinct_gauges
-from .chaining import Chain, chain_pairs, runs_on, single_rail_limit
+from .chaining import TrackChain, chain_pairs, runs_on, single_rail_limit
 from .midline import (
     MAX_OFFSET_M,
     PROVISIONAL_STEP_M,
@@ -60,9 +60,6 @@ BENT_M = 0.0025
 
 HEEL_STEP_M = 0.5
 """Step in which the end of a straight switch is searched; straight switches are 3 to 12 m long."""
-
-ROUNDS = 5
-"""Rounds of reweighting."""
 
 MAX_BACK_M = 40.0
 """Largest extension: a branch of 2500 m radius, the widest in use, is 0.3 m from the through track after 39 m."""
@@ -294,7 +291,7 @@ def _refuse_other_spacing(rails: Sequence[RailLine], parameters: Parameters) -> 
     raise NoTrackError(f"{message}.")
 
 
-def _draw(rails: Sequence[RailLine], chain: Chain, parameters: Parameters) -> Centerline | None:
+def _draw(rails: Sequence[RailLine], chain: TrackChain, parameters: Parameters) -> Centerline | None:
     """Draw the centerline of one track; None if its rails are nowhere opposite each other."""
     spacing_m = parameters.gauge_m + parameters.head_width_m
     reach_m, tolerance_m = single_rail_limit(parameters.max_gap_m), parameters.centerline_tolerance_m

@@ -28,19 +28,11 @@ DESIGNS = {
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of files.
+    """A kind of files, which may need a module.
 
-    Attributes
-    ----------
-    name : str
-    make : callable
-        Writes good files into a folder, and returns those to be damaged.
-    read : callable
-        Reads a damaged file. It may raise a `RailExtractError`; everything else is a failure.
-    needs : str
-        Module that must be installed.
-    remake : callable, optional
-        Writes a file again with other values, which is done in half of the cases instead of damaging its bytes.
+    `make` writes good files into a folder, and returns those to be damaged; `read` reads a damaged one, and may raise a
+    `RailExtractError`, while everything else is a failure; `remake` writes a file again with other values, which is
+    done in half of the cases instead of damaging its bytes.
     """
 
     name: str
@@ -50,15 +42,7 @@ class Kind:
     remake: Callable[[Path, random.Random], None] | None = None
 
     def mutant(self, folder: Path, good: Sequence[Path], seed: int) -> Path:
-        """Copy the folder of the good files, damage one of them as a seed says, and return its path.
-
-        Parameters
-        ----------
-        folder : Path
-        good : sequence of Path
-            From `make`.
-        seed : int
-        """
+        """Copy the folder of the good files of `make`, damage one of them as a seed says, and return its path."""
         rng = random.Random(f"{self.name}:{seed}")
         path = self.copied(folder, rng.choice(list(good)))
         if self.remake is not None and rng.random() < 0.5:

@@ -156,12 +156,7 @@ def read_raster(path: Path) -> None:
 def run(name: str, parameters: dict[str, Any]) -> Iterator[tuple[dict[str, Any], QgsProcessingContext]]:
     """Check the values and run an algorithm, as QGIS does; yields the results and the context with their layers.
 
-    Raises
-    ------
-    RailExtractError
-        What the algorithm refused.
-    AssertionError
-        It failed without an explanation.
+    Raises RailExtractError with what the algorithm refused, AssertionError if it failed without an explanation.
     """
     context, listener = QgsProcessingContext(), Listener()
     try:

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from heard import Heard
 from rail_extract.core.checks.points import (
     MIN_IN_WINDOW,
     WINDOW_M,
@@ -14,21 +15,12 @@ from rail_extract.core.checks.points import (
 from rail_extract.core.clouds.points import RailPoints
 from rail_extract.core.errors import CloudError
 from rail_extract.core.frame import LocalFrame
-from rail_extract.core.progress import Progress
 from rail_extract.core.rails import RailLine
 from rail_extract.core.standards import GAUGE_RANGE_MM, HEAD_WIDTH_RANGE_MM, STANDARDS, closest_standard
 from rail_extract.core.tiles.grid import MemorySource, lay_out
 
 SIDE_M = 500.0
 RNG = np.random.default_rng(4)
-
-
-class Listener(Progress):
-    def __init__(self):
-        self.warnings = []
-
-    def warning(self, text):
-        self.warnings.append(text)
 
 
 def source(*parts, class_code=10):
@@ -48,9 +40,9 @@ def strays(count, side_m=1e6):
 
 
 def test_the_sparsest_rail_is_plausible():
-    listener, one = Listener(), source(rail())
-    assert plausible([one], listener) == [one]
-    assert not listener.warnings
+    heard, one = Heard(), source(rail())
+    assert plausible([one], heard) == [one]
+    assert not heard.warnings
 
 
 def test_the_sparsest_rail_among_strays_is_plausible():
@@ -72,16 +64,16 @@ def test_the_spacing_is_that_of_the_points():
 
 
 def test_a_thin_class_beside_a_plausible_one_is_left_out_with_a_warning():
-    listener, good, thin = Listener(), source(rail()), source(rail() * 100, class_code=11)
-    assert plausible([thin, good], listener) == [good]
-    (said,) = listener.warnings
+    heard, good, thin = Heard(), source(rail()), source(rail() * 100, class_code=11)
+    assert plausible([thin, good], heard) == [good]
+    (said,) = heard.warnings
     assert said.startswith("The points of class 11 are ")
 
 
 def test_points_in_a_larger_unit_give_a_warning():
-    listener, one = Listener(), source(rail(per_metre=600) / 1000)
-    assert plausible([one], listener) == [one]
-    (said,) = listener.warnings
+    heard, one = Heard(), source(rail(per_metre=600) / 1000)
+    assert plausible([one], heard) == [one]
+    (said,) = heard.warnings
     assert said.startswith("All points of class 10 are within 0.1 m of each other: if the coordinates")
 
 
@@ -129,17 +121,17 @@ def straight(y_m, length_m=100.0):
 @pytest.mark.parametrize(("others", "said"), [(0, None), (1, None), (2, "33 %"), (4, "20 %")])
 def test_points_far_from_all_rails_give_a_warning(others, said, length_m):
     one = source(*(rail(y_m=7.0 + 0.5 * number, length_m=length_m) for number in range(others + 1)))
-    listener = Listener()
-    warn_of_unexplained(one, [straight(7.1, length_m)], listener)
-    assert [text[5:9] for text in listener.warnings] == [said] * bool(said)
+    heard = Heard()
+    warn_of_unexplained(one, [straight(7.1, length_m)], heard)
+    assert [text[5:9] for text in heard.warnings] == [said] * bool(said)
 
 
 @pytest.mark.parametrize(("per_metre", "said"), [(3, "have 3.0 points per metre"), (9, "have 9.0 points"), (20, "")])
 def test_rails_of_an_airborne_cloud_give_a_warning(per_metre, said):
-    listener = Listener()
-    warn_of_airborne(source(rail(per_metre=per_metre)), [straight(7.0)], listener)
-    assert len(listener.warnings) == bool(said)
-    assert all(said in text and "use Track Centerlines from Airborne Lidar" in text for text in listener.warnings)
+    heard = Heard()
+    warn_of_airborne(source(rail(per_metre=per_metre)), [straight(7.0)], heard)
+    assert len(heard.warnings) == bool(said)
+    assert all(said in text and "use Track Centerlines from Airborne Lidar" in text for text in heard.warnings)
 
 
 def test_points_as_thin_as_those_of_an_airborne_cloud_are_refused_with_its_algorithm():

@@ -82,6 +82,14 @@ def test_a_place_between_two_arms_of_a_hairpin_is_ambiguous():
     np.testing.assert_allclose(found.km[:3], 0.1, atol=1e-5)
 
 
+def test_on_a_ring_kilometres_run_once_round_and_either_end_is_meant_where_it_closes():
+    angle = np.linspace(0, 2 * np.pi, 2001)
+    axis = axis_of(on_circle(angle), 1.0)
+    found = locate([axis], on_circle(np.array([0.5 * np.pi, 1.5 * np.pi, 0.001]), 2.0), HECTOMETRES)
+    np.testing.assert_allclose(found.km[:2], 1 + axis.line.length_m / 1000 * np.array([0.25, 0.75]), atol=2e-5)
+    assert found.ambiguous.tolist() == [False, False, True]
+
+
 def test_the_nearest_of_two_axes_counts():
     axes = [axis_of([[0, 0], [1000, 0]], 1.0, "north"), axis_of([[1000, -100], [0, -100]], 5.0, "south")]
     found = locate(axes, np.array([[300.0, -20.0], [300.0, -90.0], [300.0, -50.0]]), HECTOMETRES)

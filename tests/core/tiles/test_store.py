@@ -8,9 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from heard import Heard
 from hypothesis import given
 from hypothesis import strategies as st
-from rail_extract.core.clouds.las import laspy
 from rail_extract.core.clouds.points import ask, read_rail_points
 from rail_extract.core.errors import Cancelled, NoRailPointsError
 from rail_extract.core.frame import LocalFrame
@@ -27,10 +27,11 @@ from rail_extract.core.tiles.store import (
     read_stored,
     spool,
 )
+from rail_extract.laboratory.scenes.las import las_data, write_las
 
 POINT = np.dtype([("xyz", "<f8", 3), ("number", "<i8")])
 
-SIDE = 30.0
+SIDE, CORNER = 30.0, [500_000, 5_400_000, 0]
 
 
 def stored(folder, xyz, tiling, chunks=3):
@@ -92,12 +93,7 @@ def files(tmp_path):
     folder = tmp_path / "cloud"
     folder.mkdir()
     for number, part in enumerate((along < 47, along >= 47)):
-        header = laspy.LasHeader(version="1.4", point_format=6)
-        header.scales, header.offsets = np.full(3, 0.001), [500_000, 5_400_000, 0]
-        cloud = laspy.LasData(header)
-        cloud.x, cloud.y, cloud.z = xyz[part].T
-        cloud.classification = codes[part]
-        cloud.write(folder / f"{number}.laz")
+        write_las(folder / f"{number}.laz", xyz[part], offsets=CORNER, classification=codes[part])
     return folder
 
 
@@ -127,15 +123,8 @@ def test_files_that_have_not_changed_are_not_read_again(files, tmp_path):
 
 
 def test_an_interrupted_reading_starts_again(files, tmp_path):
-    class Stopped(Progress):
-        left = 1
-
-        def is_cancelled(self):
-            self.left -= 1
-            return self.left < 0
-
     with pytest.raises(Cancelled):
-        spool(ask(files, [10]), SIDE, tmp_path, Stopped())
+        spool(ask(files, [10]), SIDE, tmp_path, Heard(cancel_after=1))
     again = spool(ask(files, [10]), SIDE, tmp_path)
     assert sum(again[0].counts.values()) == len(read_rail_points(files, [10])[0].xyz)
 
@@ -170,12 +159,8 @@ def test_a_file_of_the_same_size_that_has_changed_is_read_again(tmp_path):
     folder.mkdir()
 
     def write(count, time):
-        header = laspy.LasHeader(version="1.4", point_format=6)
-        header.scales, header.offsets = np.full(3, 0.001), [500_000, 5_400_000, 0]
-        cloud = laspy.LasData(header)
-        cloud.x, cloud.y, cloud.z = np.tile([[500_001.0], [5_400_001.0], [0.0]], 100)
-        cloud.classification = np.where(np.arange(100) < count, 10, 2).astype(np.uint8)
-        cloud.write(file)
+        codes = np.where(np.arange(100) < count, 10, 2)
+        write_las(file, np.tile([500_001.0, 5_400_001.0, 0.0], (100, 1)), offsets=CORNER, classification=codes)
         os.utime(file, (time, time))
         return file.stat().st_size
 
@@ -208,18 +193,14 @@ def put_a_folder(path):
 )
 @pytest.mark.parametrize("what", ["report.json", "10_*"])
 def test_damaged_points_are_read_again_with_a_warning(files, tmp_path, damage, what):
-    class Heard(Progress):
-        def warning(self, text):
-            warnings.append(text)
-
-    warnings = []
     work = tmp_path / "work"
     work.mkdir()
     first = spool(ask(files, [10]), SIDE, work)
     before = {file: file.read_bytes() for file in work.rglob("*") if file.is_file()}
     damage(sorted(work.rglob(what))[0])
-    second = spool(ask(files, [10]), SIDE, work, Heard())
-    (warning,) = warnings
+    heard = Heard()
+    second = spool(ask(files, [10]), SIDE, work, heard)
+    (warning,) = heard.warnings
     assert re.fullmatch(r"The stored points of [01]\.laz are damaged: the file is read again\.", warning)
     assert second[0].counts == first[0].counts
     assert {file: file.read_bytes() for file in work.rglob("*") if file.is_file()} == before
@@ -240,11 +221,8 @@ def test_points_keep_their_strips(tmp_path):
     folder.mkdir()
     xyz = random.uniform(0, 1, (4000, 3)) * [80.0, 20.0, 0.02] + [500_000, 5_400_000, 300]
     strips = np.where(xyz[:, 0] < 500_060, random.choice([0, 7], 4000), 9)
-    header = laspy.LasHeader(version="1.4", point_format=6)
-    header.scales, header.offsets, header.file_source_id = np.full(3, 0.001), [500_000, 5_400_000, 0], 4
-    cloud = laspy.LasData(header)
-    cloud.x, cloud.y, cloud.z = xyz.T
-    cloud.classification, cloud.point_source_id = np.full(4000, 10, np.uint8), strips
+    cloud = las_data(xyz, offsets=CORNER, classification=10, point_source_id=strips)
+    cloud.header.file_source_id = 4
     cloud.write(folder / "a.laz")
     expected = np.where(strips == 0, 4, strips)  # a point without a source id has that of its file
     (points,) = read_rail_points(folder, [10])
