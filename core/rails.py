@@ -409,6 +409,8 @@ class SearchFigures:
     sharp_m, round_m : float
         Length of the rails with a partner that are as narrow as a head, and of those that are wider and round, before
         the cloud is known to be blunt; see `classify.sharpness`.
+    unsure_m : float
+        Length of those that are wider and not round, and of rails in pavements.
     """
 
     points: int = 0
@@ -424,6 +426,7 @@ class SearchFigures:
     blur_m2: float = 0.0
     sharp_m: float = 0.0
     round_m: float = 0.0
+    unsure_m: float = 0.0
 
     def __add__(self, other: SearchFigures) -> SearchFigures:
         return SearchFigures(*(one + more for one, more in zip(astuple(self), astuple(other))))
