@@ -1,4 +1,4 @@
-"""Processor time by stage: functions are wrapped, and the time of a stage is without that of the stages within it."""
+"""Processor time by stage: functions are wrapped, and a stage does not count the stages within it."""
 
 from __future__ import annotations
 
@@ -12,13 +12,7 @@ from typing import Any
 
 
 class Stopwatch:
-    """Sums up processor time by stage.
-
-    Attributes
-    ----------
-    spent_s : Counter of str
-        Seconds of each stage.
-    """
+    """Sums up processor time, seconds, by stage."""
 
     def __init__(self, clock: Callable[[], float] = time.process_time) -> None:
         self.spent_s: Counter[str] = Counter()

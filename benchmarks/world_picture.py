@@ -10,7 +10,7 @@ import numpy as np
 
 mpl.use("Agg")
 from matplotlib import pyplot as plt
-from rail_extract.core.comparison.pieces import cut
+from rail_extract.core.comparison.measures import cut
 from rail_extract.core.disk import Destination
 from rail_extract.laboratory.ruler.worlds import NEAR_M, Fault, Judged
 from rail_extract.laboratory.scenes.raw_world import (
@@ -141,7 +141,7 @@ def _overview(axes: plt.Axes, world: World, judged: Judged) -> None:
 
 
 def _errors(axes: plt.Axes, world: World, judged: Judged) -> None:
-    """Draw the errors along the lines, with the standard errors that they state."""
+    """Draw the errors along the lines, with their standard errors."""
     if judged.found is None or not len(judged.found.line):
         return
     at, _ = _unrolled(world, cut(_lines(world, judged)).middle[:, :2])

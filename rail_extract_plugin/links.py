@@ -39,7 +39,7 @@ class _Links(QObject):
 
     @pyqtSlot(QUrl)
     def open(self, address: QUrl) -> None:
-        """Follow a link; those of an earlier session of the plugin lead nowhere."""
+        """Follow a link; links of an earlier session of the plugin lead nowhere."""
         call = self._calls.get(address.toString())
         if call is not None:
             call()
@@ -49,12 +49,7 @@ links = _Links()
 
 
 class LinkFollower(QObject):
-    """Follows the links of a log that is clicked; the log of QGIS 3.22 does not follow any.
-
-    Parameters
-    ----------
-    log : QTextEdit
-    """
+    """Follows the links of a log that is clicked; the log of QGIS 3.22 does not follow any."""
 
     def __init__(self, log: QTextEdit) -> None:
         super().__init__(log)

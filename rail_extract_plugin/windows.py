@@ -37,16 +37,13 @@ MENU = "Rail Extract"
 """Submenu of QGIS's menu of plugins."""
 
 TOOLBOX = "ProcessingToolbox"
-"""Name of the dock with the toolbox, of which that of the review is a tab."""
+"""Name of the dock with the toolbox; the review is a tab beside it."""
 
 
 class Windows(QObject):
     """Adds everything when it is made, and takes it away with `remove`.
 
-    Parameters
-    ----------
-    iface : qgis.gui.QgisInterface or None
-        None in tests without QGIS's main window, which get no menu and no dock.
+    In tests without QGIS's main window there is no interface, and no menu and no dock.
     """
 
     def __init__(self, iface) -> None:

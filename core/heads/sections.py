@@ -6,7 +6,7 @@ station then show how far it is off there. See docs/method.md section 6.7.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -156,14 +156,7 @@ class Middles:
 
 
 def outline_middles(points: HeadPoints, seen: np.ndarray) -> Middles:
-    """Find the middle of the head from its outline, at the stations of a line that is on the head.
-
-    Parameters
-    ----------
-    points : HeadPoints
-    seen : (s,) bool array
-        Where the head stands alone.
-    """
+    """Find the middle of the head from its outline where it stands alone, `seen` (s,); the line is on the head."""
     count, head_width_m = len(seen), points.width_m
     middles = Middles.unknown(count)
     left, up, level = points.in_frame()
@@ -299,31 +292,39 @@ def _blur(section: Section, wider_m: float, offset: np.ndarray, apart_up_m: floa
 
 
 def likelier_width(lines: Sequence[np.ndarray], xyz: np.ndarray, widths_m: Sequence[float]) -> float:
-    """Return which of several widths of heads explains points best, metres; the first if they do not show it.
+    """Return which of several widths of heads explains points, (n, 3), on rails best, metres; the first if none does.
 
     Other than the spread of the points, this does not depend on their noise and on how much of the faces is classified.
-
-    Parameters
-    ----------
-    lines : sequence of (k, 2) arrays
-        Rails in plan.
-    xyz : (n, 3) array
-        Points.
-    widths_m : sequence of float
     """
     grid, outlines = Grid.of(max(widths_m)), [Outline.of(width_m) for width_m in widths_m]
     likelihood = np.zeros(len(widths_m))
     for points in near_lines(lines, xyz, max(widths_m)):
-        left, up, _ = replace(points, width_m=widths_m[0]).in_frame()
-        bins = grid.number(left, up)
-        station = points.station[bins >= 0]
-        for first, last in _borders(station, len(points.stations)):
-            here = bins[bins >= 0][slice(*np.searchsorted(station, [first, last]))]
-            counts = np.bincount(here, minlength=grid.size).astype(float)
-            if counts.sum() >= MIN_SECTION_POINTS:
-                fits = [fit_section(counts, outline, grid) for outline in outlines]
-                likelihood += [log_likelihood(counts, fit, one, grid) for fit, one in zip(fits, outlines)]
+        for counts in _counted(replace(points, width_m=widths_m[0]), grid):
+            likelihood += [log_likelihood(counts, fit_section(counts, one, grid), one, grid) for one in outlines]
     return widths_m[int(np.argmax(likelihood))]
+
+
+def head_noise(points: HeadPoints) -> float:
+    """Return the noise about a head in the points of a line, across and in height together; infinite without points.
+
+    It is the logarithm of their product, in metres, and smaller where points show a sharper head.
+    """
+    grid, outline = Grid.of(points.width_m), Outline.of(points.width_m)
+    fits = [(counts.sum(), fit_section(counts, outline, grid).place[4:6].sum()) for counts in _counted(points, grid)]
+    weight, noise = np.array(fits).reshape(-1, 2).T
+    return float(np.average(noise, weights=weight)) if len(fits) else np.inf
+
+
+def _counted(points: HeadPoints, grid: Grid) -> Iterator[np.ndarray]:
+    """Yield the counts of points in the bins of each section of a line, (b,)."""
+    left, up, _ = points.in_frame()
+    bins = grid.number(left, up)
+    station = points.station[bins >= 0]
+    for first, last in _borders(station, len(points.stations)):
+        here = bins[bins >= 0][slice(*np.searchsorted(station, [first, last]))]
+        counts = np.bincount(here, minlength=grid.size).astype(float)
+        if counts.sum() >= MIN_SECTION_POINTS:
+            yield counts
 
 
 def _borders(station: np.ndarray, count: int) -> list[tuple[int, int]]:
@@ -340,15 +341,9 @@ def _borders(station: np.ndarray, count: int) -> list[tuple[int, int]]:
 def _pull(station: np.ndarray, is_left: np.ndarray, count: int) -> np.ndarray:
     """Return how far middles of a section are pulled to the left because the view changes along it, (count,) metres.
 
-    A branch leaves the track that the scanner is on: it is seen from above first, then from the side. What the whole
-    section shows on average pulls its beginning to one side and its end to the other.
-
-    Parameters
-    ----------
-    station, is_left : (n,) int and bool arrays
-        Station of each point, ascending, and whether the point is to the left of the axis.
-    count : int
-        Number of stations.
+    `station`, ascending, and `is_left` of the axis are those of each point. A branch leaves the track that the scanner
+    is on: it is seen from above first, then from the side. What the whole section shows on average pulls its beginning
+    to one side and its end to the other.
     """
     half = int(np.searchsorted(station, count // 2))
     if not 0 < half < len(station):
@@ -376,7 +371,6 @@ def _by_station(
     ----------
     place : (2,) array
         Offset and height of the section.
-    scores : Scores
     bins, station : (n,) int arrays
         Bin and station of each point.
     count : int

@@ -58,15 +58,7 @@ can be joined."""
 
 
 def random_layout(rng: np.random.Generator, size: TrackSize, family: str | None = None) -> Layout:
-    """Draw a layout.
-
-    Parameters
-    ----------
-    rng : numpy Generator
-    size : TrackSize
-    family : str, optional
-        One of `FAMILIES` or `RARE_FAMILIES`; by default, one of `FAMILIES` is drawn by `WEIGHTS`.
-    """
+    """Draw a layout of a family; by default, one of `FAMILIES` is drawn by `WEIGHTS`."""
     if family is None:
         names = list(WEIGHTS)
         family = names[rng.choice(len(names), p=np.array(list(WEIGHTS.values())) / sum(WEIGHTS.values()))]
@@ -169,7 +161,7 @@ def yard(rng: np.random.Generator, size: TrackSize) -> Layout:
 
 
 def dual_gauge(rng: np.random.Generator, size: TrackSize) -> Layout:
-    """Lay one track with a third rail for a second gauge; either gauge may be that of `size`."""
+    """Lay one track with a third rail for a second gauge; either gauge may be the one of `size`."""
     axis = random_alignment(rng, 2 * MIN_RADIUS_M)
     third = beside(axis, _third_rail_offset(rng, size), 0)
     both = track(axis, size, spot=True)

@@ -19,7 +19,7 @@ from scipy.spatial import cKDTree
 from ...core.checks.findings import examine
 from ...core.checks.listing import Finding, list_findings, verdict
 from ...core.clouds.points import ask
-from ...core.comparison.pieces import cut
+from ...core.comparison.measures import cut
 from ...core.errors import RailExtractError
 from ...core.parameters import Parameters
 from ...core.pipeline import extract_files
@@ -38,10 +38,10 @@ NEAR_M = 0.05
 """Distance in plan within which a line is on a rail."""
 
 BIN_M, END_M = 1.0, 3.0
-"""Length of rail over which points are counted, and length at both ends of what the cloud shows that is left out."""
+"""Length of rail over which points are counted, and length that is left out at both ends of a rail in the cloud."""
 
 BREAK_M = 2 * Parameters.max_gap_m
-"""Length of rail that the cloud hardly shows in which its line may end once: what is bridged, on either side."""
+"""Length of rail with hardly any points in which its line may end once: what is bridged, on either side."""
 
 FALSE_M = 3.0
 """Greatest length of lines that are on no rail."""
@@ -63,14 +63,8 @@ MISSING, FALSE, ACROSS, HEIGHT, FEWER, MORE, REFUSED, BROKEN = (
 class Limits:
     """What an extraction must reach.
 
-    Attributes
-    ----------
-    points_per_m : float
-        Points of its head from which a rail is to be found.
-    found : float
-        Least share of the length to be found.
-    across_m, height_m : float
-        Largest root mean square of the errors.
+    A rail is to be found from `points_per_m` points of its head on; `found` is the least share of this length, and
+    `across_m` and `height_m` are the largest root mean squares of the errors.
     """
 
     points_per_m: float
@@ -85,19 +79,10 @@ FROM_ABOVE = Limits(8.0, 0.98, 0.012, 0.008)
 
 @dataclass(frozen=True)
 class Fault:
-    """One reason for which a world fails.
+    """One reason for which a world fails: a figure beyond its limit, or the message of an error.
 
-    Attributes
-    ----------
-    cause : str
-    figure : float
-        The figure that is beyond its limit.
-    xyz : (3,) array or None
-        Place where it is worst; None if there is no result.
-    silent : bool
-        Whether the verdict is good, no finding is near, and the standard error there is at most half the error.
-    words : str
-        Message, of an error.
+    `xyz` is the place where it is worst, None without a result. It is silent if the verdict is good, no finding is
+    near, and the standard error there is at most half the error.
     """
 
     cause: str
@@ -109,20 +94,9 @@ class Fault:
 
 @dataclass(frozen=True)
 class Judged:
-    """An extraction compared with its world.
+    """An extraction compared with its world: its faults, figures by name, and lines matched with the truth.
 
-    Attributes
-    ----------
-    faults : tuple of Fault
-        None if it does not fail.
-    figures : dict
-        By name; for the JSON line.
-    network : RailNetwork or None
-    found : Match or None
-        Lines compared with the truth.
-    shown : (n,) bool array
-        Places of the truth that are to be found.
-    findings : tuple of Finding
+    `shown` says which places of the truth are to be found.
     """
 
     faults: tuple[Fault, ...]

@@ -31,7 +31,6 @@ class RawScene:
 
     Attributes
     ----------
-    name : str
     xyz : (n, 3) array
         Local metres.
     kind : (n,) uint8 array
@@ -39,9 +38,6 @@ class RawScene:
     rails : tuple of (k, 3) array
         Tops of the heads on their own axes.
     centerlines : tuple of (k, 3) array
-    standard : RailStandard
-    frame : LocalFrame
-    other_gauges_m : tuple of float
     crests : tuple of (k, 3) array or None
         Rails as a blunted surface shows them, lower than the tops; None where the cloud shows the tops.
     classification : (n,) uint8 array or None

@@ -33,22 +33,14 @@ FLAT = Profile(crown_radius_m=20.0, corner_radius_m=0.002)
 """A head without a crown, as profiles are that software draws."""
 
 RIDGE_M, RIDGE_SPREAD_M, RIDGE_REACH_M, RIDGE_PER_M = 0.12, 0.05, 0.075, 400
-"""Height, spread and half the width of the ridge by which dense matching of photographs shows a rail, and its points
-per metre."""
+"""A rail in the dense matching of photographs is a ridge: its height, spread, half width, and points per metre."""
 
 RIDGE_NOISE_M, RIDGE_WANDER_M, RIDGE_WANDER_LENGTH_M = 0.004, 0.004, 6.0
 """Noise of its points, and standard deviation and length of the errors that neighbouring points share."""
 
 
 def uneven(rng: np.random.RandomState, chainage: np.ndarray) -> np.ndarray:
-    """Draw how far the top of one rail is to the left of its design and above it, (n, 2) metres.
-
-    Parameters
-    ----------
-    rng : RandomState
-    chainage : (n,) array
-        Metres along the track.
-    """
+    """Draw how far the top of one rail is to the left of its design and above it, (n, 2) metres, by chainage."""
     off = np.zeros((len(chainage), 2))
     for column, waves in enumerate((WAVES_ACROSS, WAVES_UP)):
         for amplitude_m, length_m in waves:
@@ -71,18 +63,8 @@ def plain_track(
 ) -> Scene:
     """Build a track of 60 m in a curve of 800 m, said to be of 60E1.
 
-    Parameters
-    ----------
-    name : str
-    seed : int
-    scanner : Scanner
-    rough : bool
-        Whether its rails have waves and welds.
-    shape : Profile
-    true_head_m : float
-        True width of the heads.
-    kept : float
-        Share of the points that the cloud has.
+    Rough rails have waves and welds; `true_head_m` is the true width of the heads, and `kept` the share of the points
+    that the cloud has.
     """
     rng = np.random.RandomState(seed)
     true = replace(STANDARD, head_width_m=true_head_m)

@@ -24,7 +24,7 @@ WHOLE_HEIGHT_M = 0.8
 """Height that the whole section shows at least: both heads of a track with the largest cant, and what is near."""
 
 HEAD_M = 0.04
-"""Height of the outline of a head without points: about that of the heads of all profiles."""
+"""Height of the outline of a head without points: about as high as heads of all profiles."""
 
 HEADS, HEADS_HIGH = 3.0, 1.6
 """Width and height of an enlarged head in head widths at least, so that points next to it are seen, too."""
@@ -32,17 +32,7 @@ HEADS, HEADS_HIGH = 3.0, 1.6
 
 @dataclass(frozen=True)
 class Panel:
-    """A part of a section and where it is drawn.
-
-    Attributes
-    ----------
-    box : QRectF
-    right, up : float
-        Middle, metres.
-    width_m, height_m : float
-        What is seen at least.
-    title : str
-    """
+    """A part of a section and where it is drawn: its middle and the least that is seen of it, metres."""
 
     box: QRectF
     right: float

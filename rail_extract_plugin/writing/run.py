@@ -36,18 +36,7 @@ TABLE = "|layername="
 
 @dataclass(frozen=True)
 class RunCloud:
-    """The cloud of a run.
-
-    Attributes
-    ----------
-    paths : tuple of str
-    class_codes : tuple of int
-    crs_wkt : str or None
-        Coordinate system for files that state none.
-    head_width_m : float
-    units_m : tuple of float
-        Lengths of the units of x, y and z.
-    """
+    """The cloud of a run, with a coordinate system for files that state none, and the units of x, y and z in metres."""
 
     paths: tuple[str, ...]
     class_codes: tuple[int, ...]
@@ -63,15 +52,9 @@ class RunCloud:
 
 
 def new_run(tool: str, value: Any, context: QgsProcessingContext) -> dict[str, str]:
-    """Return the properties that the layers of a new run share.
+    """Return the properties that the layers of a new run of a tool, by its label, share.
 
-    Parameters
-    ----------
-    tool : str
-        Label of the algorithm.
-    value : object
-        Value of its main input, which gives the layers their names: that of the layer, or of the file.
-    context : QgsProcessingContext
+    The main input gives the layers their names: that of a layer, or of a file.
     """
     value = value.source if isinstance(value, QgsProcessingFeatureSourceDefinition) else value
     value = value.valueAsString(context.expressionContext())[0] if isinstance(value, QgsProperty) else value
@@ -118,7 +101,7 @@ def cloud_of(layer: QgsMapLayer) -> RunCloud | None:
 
 
 def name_run(layer: QgsMapLayer, title: str) -> str:
-    """Return the name of the run that made a layer, that of its algorithm and input; empty if the layer states none.
+    """Return the name of the run that made a layer, from its algorithm and input; empty if the layer has none.
 
     Runs of the same algorithm and input are numbered from the second on. A layer that is called by its title gets the
     name of the input as well; others, such as those of files, are called as the user wants.

@@ -10,7 +10,7 @@ from qgis.PyQt.QtGui import QColor
 from .. import compat
 
 COLORS = {"rails": "#1565c0", "centerlines": "#e64a19", "findings": "#d62839"}
-"""Colour of the lines by style, that of most of them in the map."""
+"""Colour of the lines by style, as most of them have it in the map."""
 
 WIDTHS_PX = {"rails": 3.0, "centerlines": 2.0, "findings": 6.0}
 """Width on the screen by style: lines as wide as a railhead disappear a few tens of metres away."""
@@ -19,11 +19,7 @@ WIDTHS_PX = {"rails": 3.0, "centerlines": 2.0, "findings": 6.0}
 def show_lines_in_3d(layer: QgsVectorLayer, style: str) -> None:
     """Draw a layer of lines in 3D map views at the heights of its vertices; without them, QGIS lays it on the terrain.
 
-    Parameters
-    ----------
-    layer : QgsVectorLayer
-    style : str
-        Name of the layer's style; other layers than those in `COLORS` stay as they are.
+    Layers of other styles than those in `COLORS` stay as they are.
     """
     if style not in COLORS:
         return

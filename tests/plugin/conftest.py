@@ -12,16 +12,15 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import laspy
 import numpy as np
 import pytest
 from faults import FINE, REFUSED, WARNED, Fault
 from fuzzing.clouds import chunks_of_any_size
-from rail_extract.core.clouds.crs import import_pyproj
+from rail_extract.laboratory.scenes.las import write_las
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 
-from qgis.core import QgsApplication, QgsProcessingContext, QgsProcessingFeedback, QgsProject  # noqa: E402
+from qgis.core import NULL, QgsApplication, QgsProcessingContext, QgsProcessingFeedback, QgsProject  # noqa: E402
 
 EXTRACT_RAILS = "railextract:extractrails"
 ROOT = Path(__file__).resolve().parents[2]
@@ -143,6 +142,22 @@ def run_step(qgis, plugin, context):
 
 
 @pytest.fixture
+def run_table(run_step, context, new_feedback):
+    """Run an algorithm whose OUTPUT is a layer; returns results, layer, values by field, and what was said."""
+
+    def run(name, feedback=None, **parameters):
+        feedback = feedback or new_feedback()
+        outcome = run_step(name, {"OUTPUT": "memory:", **parameters}, feedback)
+        assert outcome.ok, outcome.error
+        layer = context.getMapLayer(outcome.results["OUTPUT"])
+        rows = [[None if value == NULL else value for value in one.attributes()] for one in layer.getFeatures()]
+        values = {field: [row[at] for row in rows] for at, field in enumerate(layer.fields().names())}
+        return outcome.results, layer, values, feedback
+
+    return run
+
+
+@pytest.fixture
 def run(run_step):
     """The same for Extract Rails."""
 
@@ -165,18 +180,10 @@ def write_cloud(tmp_path):
         any_chunk_size: bool = False,
         strips: np.ndarray | int = 0,
     ) -> Path:
-        header = laspy.LasHeader(point_format=6, version="1.4")
-        header.scales = [1e-7, 1e-7, 1e-3] if epsg == 4326 else [0.001] * 3
-        header.offsets = xyz[0]
-        if epsg is not None:
-            header.add_crs(import_pyproj().CRS.from_epsg(epsg))
-        cloud = laspy.LasData(header)
-        cloud.xyz = xyz
-        cloud.classification = np.full(len(xyz), class_code, dtype=np.uint8)
-        cloud.point_source_id = np.full(len(xyz), strips, dtype=np.uint16)
+        scales = [1e-7, 1e-7, 1e-3] if epsg == 4326 else 0.001
+        values = {"scales": scales, "offsets": xyz[0], "classification": class_code, "point_source_id": strips}
         with chunks_of_any_size() if any_chunk_size else nullcontext():
-            cloud.write(folder / name)
-        return folder / name
+            return write_las(folder / name, xyz, epsg and f"EPSG:{epsg}", **values)
 
     return write
 
