@@ -62,7 +62,7 @@ five points, one may be a stray."""
 FOUND_HEAD_M, FOUND_SIGMAS = 0.036, 5.0
 """Depth below the crown of what was found in a raw cloud, and standard deviations of the noise if they are more, as in
 clouds from the air. The search takes all of the web down to 50 mm below the top where a rail is seen from the side; few
-points of a rail so far away show its faces. The lowest part of a face may go."""
+points of a rail at such angles show its faces. The lowest part of a face may go."""
 
 RECESS_M = 0.015
 """Least distance of a web from the faces above it, and of the tip of a foot: 20 mm or more on every standard, and the
