@@ -2,7 +2,7 @@
 
 Whenever a run is interrupted, the old file or the new one is there, never part of each. A shapefile consists of several
 files: between the old set and the new one there is a moment without the file that opens the set, and the next run that
-writes to the folder completes an interrupted move.
+writes to the folder completes an interrupted move. Temporary folders that killed runs have left are removed.
 """
 
 from __future__ import annotations
@@ -10,17 +10,35 @@ from __future__ import annotations
 import errno
 import json
 import os
+import platform
+import re
+import secrets
 import shutil
 import stat
+import sys
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
 from .errors import DiskError
-from .scratch import lock, scratch_folder, sweep
+
+PREFIX = ".rail_extract_"
+NAME = re.compile(re.escape(PREFIX) + "[0-9a-f]{12}")
+
+MARK = "in_use"
+"""File in a temporary folder that its process keeps locked; it holds the name of the computer."""
+
+MIN_AGE_S = 60.0
+"""Younger folders are not removed: their process may not have locked them yet."""
+
+MIN_UNMARKED_AGE_S = 86_400.0
+"""The same for folders whose process was killed before it had marked them."""
+
+OWNER_ONLY = 0o777 if sys.platform == "win32" else 0o700
+"""Rights of a temporary folder. On Windows, files that are moved keep the rights of the folder they come from."""
 
 LOGS = ("-wal", "-journal")
 """Suffixes, added to a GeoPackage's name, of files with changes that are not yet in it."""
@@ -43,6 +61,79 @@ NEW, OLD, MOVING = "new", "old", "moving"
 LOCK_S, LOCK_STEP_S = 5.0, 0.05
 """How long a run waits for another that moves files into the same folder, which takes milliseconds, and how often it
 tries. Then it continues: anybody who can read a folder can lock it."""
+
+
+@contextmanager
+def scratch_folder(parent: Path) -> Iterator[Path]:
+    """Create a folder in another one that no other process knows or uses, and delete it in any case.
+
+    Its name is unpredictable, and creating it fails if anything has this name, so that nobody can direct the files
+    elsewhere with a symbolic link.
+    """
+    folder = parent / f"{PREFIX}{secrets.token_hex(6)}"
+    folder.mkdir(OWNER_ONLY)
+    try:
+        computer = platform.node()
+        with (folder / MARK).open("x", encoding="utf-8") as mark:
+            mark.write(computer)
+            mark.flush()
+            with suppress(OSError):  # on a drive without locks, no folder is ever taken for abandoned
+                lock(mark.fileno())
+            yield folder
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def sweep(parent: Path, rescue: Callable[[Path], None] | None = None) -> None:
+    """Remove the temporary folders that killed processes of this user have left; `rescue` gets each of them before."""
+    with suppress(OSError):
+        for entry in os.scandir(parent):
+            if NAME.fullmatch(entry.name) and entry.is_dir(follow_symlinks=False) and _is_abandoned(Path(entry)):
+                if rescue is not None:
+                    rescue(Path(entry))
+                shutil.rmtree(entry, ignore_errors=True)
+
+
+def discard(path: Path) -> None:
+    """Delete whatever has a name, a folder with all its content."""
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path)
+    else:
+        path.unlink(missing_ok=True)
+
+
+def _is_abandoned(folder: Path) -> bool:
+    """Return whether a folder belongs to this user and the process that created it on this computer is gone."""
+    mark, now = folder / MARK, time.time()
+    try:
+        state = folder.stat()
+        if hasattr(os, "getuid") and state.st_uid != os.getuid():
+            return False
+        if not mark.exists() or not mark.stat().st_size:
+            return now - state.st_mtime > MIN_UNMARKED_AGE_S
+        with mark.open("r+", encoding="utf-8") as opened:
+            if opened.read() != platform.node() or now - mark.stat().st_mtime < MIN_AGE_S:
+                return False
+            lock(opened.fileno())
+            return True
+    except (OSError, UnicodeDecodeError):
+        return False
+
+
+if sys.platform == "win32":
+    import msvcrt
+
+    def lock(number: int) -> None:
+        """Lock an open file, given by its number, until it is closed; `OSError` if another process has locked it."""
+        os.lseek(number, 0, os.SEEK_SET)
+        msvcrt.locking(number, msvcrt.LK_NBLCK, 1)
+
+else:
+    import fcntl
+
+    def lock(number: int) -> None:
+        """Lock an open file, given by its number, until it is closed; `OSError` if another process has locked it."""
+        fcntl.flock(number, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
 @contextmanager

@@ -58,14 +58,10 @@ def length_along(vertices: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Polyline:
-    """A line with chainages; all that is computed along it is in plan.
+    """A line, `xyz` (n, 2) or (n, 3) metres, with chainages; all that is computed along it is in plan.
 
-    Attributes
-    ----------
-    xyz : (n, 2) or (n, 3) array
-        Vertices, metres.
-    given : (n,) array or None
-        Chainages of the vertices, rising, where they are those of another line; None for the distance from the first.
+    `given`, (n,), are rising chainages of the vertices where they are those of another line; None for the distance from
+    the first.
 
     Examples
     --------

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.sparse import block_diag, csr_matrix, diags, vstack
 
 from ..polyline import Polyline, cross
-from .cross_sections import STATION_M, Sections
+from .ridges import OUTLIER, STATION_M, Sections
 from .search import parallel
 
 LITTLE = 1e-12
@@ -40,9 +40,6 @@ third differences of 0.056 m, the toe of a switch 0.3 m; its tracks part with se
 
 CURVE_PASSES = 12
 """Weightings of the curve, after which it hardly moves."""
-
-OUTLIER = 3.0
-"""Residual, in standard errors, at which a section has lost 3/4 of its weight."""
 
 TRUSTED = 0.2
 """Least weight of the sections whose residuals judge the standard errors."""
@@ -108,7 +105,7 @@ def differences(count: int, order: int) -> csr_matrix:
 
 
 @dataclass(frozen=True)
-class Curve:
+class TrackCurve:
     """The curve of a track at the middles of its sections, `xy` (n, 2).
 
     `sigma`, (n,), is the standard error across, and `beside`, (n,), the distance of the section's own middle from the
@@ -120,7 +117,7 @@ class Curve:
     beside: np.ndarray
 
 
-def draw_together(lines: Sequence[Polyline], found: Sequence[Sections]) -> list[Curve]:
+def draw_together(lines: Sequence[Polyline], found: Sequence[Sections]) -> list[TrackCurve]:
     """Draw the curves of tracks through their sections, which are seen on `lines`.
 
     How much curvature and distance change is measured along the tracks (expectation maximisation of the variance of the
@@ -143,7 +140,9 @@ def draw_together(lines: Sequence[Polyline], found: Sequence[Sections]) -> list[
         turn_m = stiff.measured(curve.bend)
     error, good = np.sqrt(curve.variance), shows & (robust > TRUSTED)
     parts = np.split(np.arange(len(target)), np.cumsum([len(t) for t in stations])[:-1])
-    return [Curve(curve.values[at], error[at] * _spread((beside / sigma)[at][good[at]]), beside[at]) for at in parts]
+    return [
+        TrackCurve(curve.values[at], error[at] * _spread((beside / sigma)[at][good[at]]), beside[at]) for at in parts
+    ]
 
 
 def _spread(residual: np.ndarray) -> float:

@@ -42,7 +42,7 @@ OWN_LEVEL_M, MIN_SHARED = 2.0, 5
 
 
 @dataclass(frozen=True)
-class Points:
+class GuidePoints:
     """Points around a guide: places, (n, 3) metres, the number of each one's strip, and its chainage on the guide."""
 
     xyz: np.ndarray
@@ -50,7 +50,7 @@ class Points:
     t: np.ndarray
 
     @classmethod
-    def near(cls, line: Polyline, xyz: np.ndarray, strip: np.ndarray, reach_m: float) -> Points:
+    def near(cls, line: Polyline, xyz: np.ndarray, strip: np.ndarray, reach_m: float) -> GuidePoints:
         """Return the points, (n, 3) of strips (n,), within reach of a line."""
         feet = line.feet(xyz[:, :2], reach_m)
         return cls(xyz[feet.point], strip[feet.point], feet.t)
@@ -144,7 +144,7 @@ class Corridor:
         return Corridor(t, across, height, strip, self.start_m, self.level)
 
 
-def gather(points: Points, axis: Polyline, reach_m: float) -> Corridor | None:
+def gather(points: GuidePoints, axis: Polyline, reach_m: float) -> Corridor | None:
     """See points along an axis, up to a distance from it; None if there is no level to see."""
     t, across = axis.feet_near(points.xyz[:, :2], points.t)
     near = np.abs(across) <= reach_m

@@ -38,7 +38,7 @@ that goes on from the table of this one must find it in the same place."""
 
 
 @dataclass(frozen=True)
-class Kind:
+class SignalKind:
     """A kind of signal.
 
     `order` is how many times the bend is integrated, `degrees` are those of the polynomials in the first partition, and
@@ -58,16 +58,16 @@ class Kind:
 
 
 SMOOTH = 0.2
-"""Share of `Kind.shown_m` below which single points scatter only if the line was smoothed: errors of several lengths
-hang together then, and what the search takes for its noise is less than these."""
+"""Share of `SignalKind.shown_m` below which single points scatter only if the line was smoothed: errors of several
+lengths hang together then, and what the search takes for its noise is less than these."""
 
 LEAST_ERROR_M = 0.001
 """Least standard deviation of a line across and in height, metres: no survey of a track is better. Where single points
 scatter by less, the line was smoothed, and what their errors lack is shared by neighbours: the bends of a smooth error
 would be taken for elements."""
 
-PLAN, HEIGHT = Kind(2, (1, 2, 3), True, LEAST_ERROR_M), Kind(2, (1, 2), False, LEAST_ERROR_M)
-CANT = Kind(1, (0, 1), False, shown_m=math.sqrt(2.0) * LEAST_ERROR_M)
+PLAN, HEIGHT = SignalKind(2, (1, 2, 3), True, LEAST_ERROR_M), SignalKind(2, (1, 2), False, LEAST_ERROR_M)
+CANT = SignalKind(1, (0, 1), False, shown_m=math.sqrt(2.0) * LEAST_ERROR_M)
 """Kinds of signals. Cant is the difference of two heights."""
 
 
@@ -81,7 +81,7 @@ class Signal:
     s: np.ndarray
     y: np.ndarray
     share: np.ndarray
-    kind: Kind
+    kind: SignalKind
 
     @property
     def step_m(self) -> float:

@@ -41,12 +41,7 @@ class StationRange:
 
 @dataclass(frozen=True)
 class Stations:
-    """The stations along a curve.
-
-    Attributes
-    ----------
-    pieces : tuple of StationRange
-        At least one, in order of `s`.
+    """The stations along a curve: at least one piece, in order of `s`.
 
     Examples
     --------

@@ -59,7 +59,7 @@ DOUBTS = (UNSUPPORTED, OFF_GAUGE, UNSURE)
 
 
 @dataclass(frozen=True)
-class Place:
+class DoubtfulPlace:
     """A section of a track to look at between two chainages; `length_m` is the length in doubt within it."""
 
     track_id: int
@@ -98,7 +98,7 @@ class TrackFindings:
         """Return the length in doubt for a reason."""
         return float(self.geometry.cells_m[self.doubtful[doubt]].sum())
 
-    def places(self, doubt: Doubt, merge_m: float = MERGE_M) -> list[Place]:
+    def places(self, doubt: Doubt, merge_m: float = MERGE_M) -> list[DoubtfulPlace]:
         """Return the places in doubt for a reason; those no more than `merge_m` apart are merged."""
         return list(_places(self.geometry, doubt, self.doubtful[doubt], merge_m))
 
@@ -159,7 +159,7 @@ class Findings:
         """Share of the length that is in doubt for any reason."""
         return sum(self.length_of(doubt) for doubt in DOUBTS) / self.length_m if self.tracks else 1.0
 
-    def places(self) -> list[Place]:
+    def places(self) -> list[DoubtfulPlace]:
         """Return all places to look at, in order of decreasing length in doubt."""
         found = [place for track in self.tracks for doubt in DOUBTS for place in track.places(doubt)]
         return sorted(found, key=lambda place: -place.length_m)
@@ -260,7 +260,7 @@ def gauge_off(geometry: TrackGeometry, nominal_mm: float) -> np.ndarray:
     return np.where(off_mm <= GAUGE_SIGMAS * geometry.sigma_mm, 0.0, off_mm)
 
 
-def _places(geometry: TrackGeometry, doubt: Doubt, doubtful: np.ndarray, merge_m: float) -> Iterator[Place]:
+def _places(geometry: TrackGeometry, doubt: Doubt, doubtful: np.ndarray, merge_m: float) -> Iterator[DoubtfulPlace]:
     """Join stations in doubt into places."""
     numbers = np.flatnonzero(doubtful)
     if not len(numbers):
@@ -270,7 +270,7 @@ def _places(geometry: TrackGeometry, doubt: Doubt, doubtful: np.ndarray, merge_m
     apart = np.flatnonzero(starts[1:] - ends[:-1] > merge_m) + 1
     for mine in np.split(np.arange(len(numbers)), apart):
         length_m = geometry.cells_m[numbers[mine]].sum()
-        yield Place(geometry.track_id, doubt, float(starts[mine[0]]), float(ends[mine[-1]]), float(length_m))
+        yield DoubtfulPlace(geometry.track_id, doubt, float(starts[mine[0]]), float(ends[mine[-1]]), float(length_m))
 
 
 def known(values: np.ndarray) -> np.ndarray:

@@ -24,9 +24,9 @@ from .findings import (
     UNSUPPORTED,
     UNSURE,
     UNSURE_MM,
+    DoubtfulPlace,
     Findings,
     Hole,
-    Place,
     TrackFindings,
     examine,
     known,
@@ -132,7 +132,7 @@ def _possible_error(track: TrackFindings) -> np.ndarray:
     return np.minimum(np.nan_to_num(error_mm, nan=OFF_RAIL_MM), OFF_RAIL_MM)
 
 
-def _of_place(track: TrackFindings, place: Place, error_mm: np.ndarray) -> Finding:
+def _of_place(track: TrackFindings, place: DoubtfulPlace, error_mm: np.ndarray) -> Finding:
     geometry = track.geometry
     within = (geometry.chainage_m >= place.start_m) & (geometry.chainage_m <= place.end_m)
     numbers = np.flatnonzero(within & track.doubtful[place.doubt])

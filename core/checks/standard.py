@@ -25,8 +25,7 @@ from ..rails import HEAD_OFF_M, HeadWidths, RailLine, SearchFigures
 from ..standards import HEAD_WIDTH_RANGE_MM, SAME_GAUGE_M, STANDARDS, Gauge, RailStandard, closest_standard, of_gauge
 from ..tiles.grid import PointSource
 from ..tracks.parallels import width_at
-from .density import fullest_square
-from .gauge_estimate import Spacings, measure_spacings
+from .points import Spacings, fullest_square, measure_spacings
 
 SAMPLE_M = 50.0
 """Half the side of the area whose points show the width of the heads."""

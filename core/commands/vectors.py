@@ -16,9 +16,9 @@ import shapely
 
 from ..clouds.crs import import_pyproj, parse_crs
 from ..errors import ParameterError
-from ..files.geopackage import geometries_in
+from ..files.writing import geometries_in
 from ..jobs.declaration import LINE, POINT, POLYGON
-from ..jobs.features import Feature, Source
+from ..jobs.features import Feature, FeatureSource
 from ..jobs.lines import Row
 
 LAYER = "|layername="
@@ -28,7 +28,7 @@ KINDS = {"Point": POINT, "LineString": LINE, "Polygon": POLYGON}
 
 
 @dataclass(frozen=True)
-class Features(Source):
+class Features(FeatureSource):
     """A layer of a file, as a whole in memory: geometries, (n,), None where there is none, and (n,) values by field."""
 
     name: str

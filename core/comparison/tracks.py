@@ -16,8 +16,7 @@ from ..polyline import Chords, Polyline, cross, runs
 from ..progress import SILENT, Progress
 from ..rails import RailLine, cell_borders
 from ..tracks.parallels import most_common_spacing
-from .pieces import cut, spacing_and_cant
-from .shift import Shift, find_shift
+from .measures import Shift, cut, find_shift, spacing_and_cant
 
 BOTH, MISSING, EXTRA = "both", "missing", "extra"
 """States of a station: on a line of both surveys, of the reference only, or of the other survey only."""

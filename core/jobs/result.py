@@ -16,7 +16,7 @@ from ..files.layers import AnyLayer, written_by_name
 if TYPE_CHECKING:
     import geopandas
 
-    from ..files.raster_file import RasterHeader
+    from ..files.rail_rasters import RasterHeader
     from ..frame import LocalFrame
     from ..raster import RailRaster
 

@@ -13,10 +13,9 @@ from ..frame import LocalFrame
 from ..progress import Progress
 from ..rails import Centerline, RailLine, TrackGeometry
 from ..standards import RAIL_CLASS
-from ..tiles.spool import SpooledPoints
-from .area_points import Area, spool_points_in
-from .clouds import Bounds
-from .reading import way
+from ..tiles.store import SpooledPoints
+from .clouds import Area, Bounds, spool_points_in
+from .lines import way
 from .values import Values
 
 MARGIN_M = 1.0

@@ -12,16 +12,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..design_numbers import KM, LENGTH, NUMBER, checked, number_in, quoted
-from ..design_places import are_places, check_places
+from ..design_numbers import KM, LENGTH, NUMBER, are_places, check_places, checked, number_in, quoted
 from ..errors import RailExtractError
 from ..frame import LocalFrame
 from ..polyline import Polyline
 from ..progress import SILENT, Progress
 from ..rails import Kilometres, TrackGeometry
 from .line import KilometreLine, locate, nearest
-from .stationing import Jump, Stationing, stationing_of
-from .text import read_km
+from .stationing import Jump, Stationing, read_km, stationing_of
 
 POST_OFFSET_M = 50.0
 """Posts further than this from the axis are left out, metres: they belong to another line."""
@@ -54,7 +52,7 @@ class Post:
 
 
 @dataclass(frozen=True)
-class Start:
+class AxisStart:
     """The kilometre at the first vertex of a line, and whether kilometres decrease along it."""
 
     km: float
@@ -70,7 +68,7 @@ class Axes:
 
 
 def make_axes(
-    lines: Sequence[AxisLine], start: Start | None = None, posts: Sequence[Post] = (), jumps: Sequence[Jump] = ()
+    lines: Sequence[AxisLine], start: AxisStart | None = None, posts: Sequence[Post] = (), jumps: Sequence[Jump] = ()
 ) -> Axes:
     """Give lines their kilometres by posts, else by a first kilometre, else by their M values.
 
@@ -99,7 +97,7 @@ def make_axes(
     return _told([_by_measures(line) for line in joined])
 
 
-def _check(lines: Sequence[AxisLine], start: Start | None, posts: Sequence[Post]) -> None:
+def _check(lines: Sequence[AxisLine], start: AxisStart | None, posts: Sequence[Post]) -> None:
     """Refuse lines, a start and posts that are on no railway; where they are read, kilometres are checked."""
     for number, line in enumerate(lines, start=1):
         where = f"The line {line.name or number} of AXIS"

@@ -15,14 +15,13 @@ import numpy as np
 
 from ..classify.settings import Settings
 from ..clouds.points import Request
-from ..disk import Destination, writing
+from ..disk import Destination, scratch_folder, writing
 from ..errors import NoRailPointsError, ParameterError
 from ..kernels import device_of
-from ..learned.examples import CHECKS, Examples, Plan, save_index, write_square
+from ..learned.blocks import CHECKS, Examples, Plan, save_index, write_square
 from ..learned.model import WEIGHTS_SUFFIX, check_torch, load, save
 from ..progress import SILENT, Progress
 from ..run.loop import Runner
-from ..scratch import scratch_folder
 from ..tiles.grid import Square
 from ..tiles.store import files_of, read_stored
 from .finding import POINT, sort_files
@@ -67,8 +66,7 @@ def train_classifier(
     file, is removed once they are written. Raises NoRailPointsError or ParameterError if nothing can be learned from
     the labels, or the folder holds another training.
     """
-    from ..learned.training import Settings as TrainingSettings
-    from ..learned.training import train
+    from ..learned.training import TrainingSettings, train
 
     folder = folder_of(weights.file)
     reading, learning = progress.divide((READING, 1 - READING))

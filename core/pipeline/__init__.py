@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from .. import checks
-from ..checks.density import occupied_squares, plausible
 from ..checks.doubts import doubting_scatter, strip_courses
+from ..checks.points import occupied_squares, plausible
 from ..checks.standard import warn_of_spacing
 from ..clouds.points import RailPoints
 from ..errors import NoRailPointsError, NoTrackError, RailExtractError
@@ -26,8 +26,8 @@ from ..rails import Centerline, RailLine, RailNetwork, TrackGeometry
 from ..raster import RailRaster
 from ..run.loop import Runner
 from ..run.tasks import Context, Task
-from ..squares.pieces import SquareRails, rows_in_frame
 from ..squares.remeasuring import measure_rails
+from ..squares.seams import SquareRails, rows_in_frame
 from ..squares.steps import clean_square, engine_for, rails_of_square, square_side, whole_rails
 from ..tiles.grid import Key, MemorySource, PointSource, SortedPoints, Square, around, assembled
 from ..tracks.centerlines import tracks_of

@@ -12,14 +12,14 @@ from typing import Any
 
 import numpy as np
 
-from ..alignment.deviations import Deviations
 from ..alignment.elements import Alignment, CantElement, Element, PlanElement, VerticalElement
+from ..alignment.measured import Deviations
 from ..alignment.stations import StationRange, stations_of
 from ..checks.findings import largest, rms
 from ..progress import metres
 from .markup import figure, legend, made, page, section, table, tag, text, tiles
-from .origin import stated
-from .plots import LEFT, SPACE, TICKS_ACROSS, WIDTH, Curve, Frame, Panel, across, bottom_of, broken, round_up
+from .page import stated
+from .plots import LEFT, SPACE, STEP_M, TICKS_ACROSS, WIDTH, Curve, Frame, Panel, across, bottom_of, broken, round_up
 
 PROPOSAL = (
     "A fitted alignment is a proposal: the elements that the measured track most likely follows. It does not show what "
@@ -44,9 +44,6 @@ STRIP, LABEL = 22.0, 46.0
 HALF_CHORD_M, HALF_BASE_M = 10, 5
 """Distances between the three points whose circle gives the measured curvature, and from a place to the two points
 that give its gradient, metres: those of the track geometry."""
-
-STEP_M = 1.5
-"""Places further apart belong to different parts of a track: deviations are given by the metre."""
 
 ALIGNMENT_STYLE = """
 svg .frame { fill: none; stroke: var(--line); }

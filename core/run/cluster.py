@@ -20,14 +20,13 @@ from distributed import Client, Future, LocalCluster
 from distributed import TimeoutError as NoAnswer
 from distributed.security import Security
 
+from ..disk import scratch_folder, sweep
 from ..errors import ParameterError, RailExtractError, WorkerError
 from ..kernels import ENVIRONMENT
 from ..progress import Progress
-from ..scratch import scratch_folder, sweep
 from .loop import Answer, Executor, Heard, next_of
 from .processes import worker_count
-from .tasks import Context, Once, Task
-from .version import CORE, version
+from .tasks import CORE, Context, Once, Task, version
 
 MAX_DEATHS = 10
 """Local workers that may die while they execute a task, for whatever reason, before the task is abandoned."""

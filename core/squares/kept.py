@@ -18,17 +18,15 @@ from typing import Any
 
 import numpy as np
 
-from ..disk import writing
+from ..disk import discard, scratch_folder, sweep, writing
 from ..errors import RailExtractError
 from ..frame import LocalFrame
 from ..rails import RailLine, Support
 from ..raster import RailRaster
-from ..run.tasks import Context, Task
-from ..run.version import version
-from ..scratch import discard, scratch_folder, sweep
+from ..run.tasks import Context, Task, version
 from ..tiles.grid import Square
-from ..tiles.spool import SpooledPoints
-from .pieces import SquareRails
+from ..tiles.store import SpooledPoints
+from .seams import SquareRails
 
 KEPT = {one.__name__: one for one in (RailRaster, SquareRails, Square, LocalFrame, RailLine, Support)}
 """Classes of which results consist, besides numbers, texts, arrays, tuples and mappings."""

@@ -70,7 +70,7 @@ class _Ends:
 
 
 @dataclass(frozen=True)
-class Chain:
+class TrackChain:
     """A track: its sections in order, all in the same direction.
 
     One rail alone may be followed `behind_m` back from the first section, and `ahead_m` on from the last.
@@ -88,7 +88,7 @@ def single_rail_limit(max_gap_m: float) -> float:
 
 def chain_pairs(
     rails: Sequence[RailLine], pairs: Sequence[RailPair], max_gap_m: float, tolerance_m: float = 0.05
-) -> tuple[Chain, ...]:
+) -> tuple[TrackChain, ...]:
     """Chain sections of track that continue each other.
 
     Either a rail leads from one to the next, or they point at each other across at most `max_gap_m` without any rail.
@@ -105,13 +105,13 @@ def chain_pairs(
         for end in (link.first, link.second):
             alone_m[end] = min(alone_m[end], max(link.length_m, 0.0))
     loose = [end for end in alone_m if end not in partner]
-    chains: list[Chain] = []
+    chains: list[TrackChain] = []
     done: set[int] = set()
     for start in loose + list(range(0, 2 * len(pairs), 2)):  # sections that no loose end leads to form rings
         row, last = _follow(pairs, partner, start, done)
         if row:
             behind, ahead = (alone_m[end] if end not in partner else 0.0 for end in (start, last))
-            chains.append(Chain(tuple(row), behind, ahead))
+            chains.append(TrackChain(tuple(row), behind, ahead))
     return tuple(chains)
 
 

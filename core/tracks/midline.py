@@ -13,14 +13,14 @@ import numpy as np
 
 from ..polyline import Chords
 from ..rails import RailLine
-from .chaining import Chain, RailAhead, rails_ahead, runs_on
+from .chaining import RailAhead, TrackChain, rails_ahead, runs_on
 from .pairing import RailPair
 
 PROVISIONAL_STEP_M = 0.25
 """Spacing of the vertices: in a tram curve of 25 m the chords deviate by 0.3 mm."""
 
 
-def provisional_centerline(rails: Sequence[RailLine], chain: Chain, half_m: float, reach_m: float) -> np.ndarray:
+def provisional_centerline(rails: Sequence[RailLine], chain: TrackChain, half_m: float, reach_m: float) -> np.ndarray:
     """Draw a line, (n, 2), half a spacing from a rail of the track, and straight where there is no rail.
 
     A rail that does not reach the next section is followed for `reach_m` at most.

@@ -31,7 +31,6 @@ class RawScene:
 
     Attributes
     ----------
-    name : str
     xyz : (n, 3) array
         Local metres.
     kind : (n,) uint8 array
@@ -39,9 +38,6 @@ class RawScene:
     rails : tuple of (k, 3) array
         Tops of the heads on their own axes.
     centerlines : tuple of (k, 3) array
-    standard : RailStandard
-    frame : LocalFrame
-    other_gauges_m : tuple of float
     crests : tuple of (k, 3) array or None
         Rails as a blunted surface shows them, lower than the tops; None where the cloud shows the tops.
     classification : (n,) uint8 array or None
@@ -160,7 +156,7 @@ def placed(line: Curve, station: np.ndarray, left: np.ndarray, height: np.ndarra
     return np.column_stack([xy + left[:, None] * normal, height])
 
 
-def crests_of(rails: Sequence[np.ndarray], line: Curve, surface: Surface, blur_m: float) -> tuple[np.ndarray, ...]:
+def crests_of(rails: tuple[np.ndarray, ...], line: Curve, surface: Surface, blur_m: float) -> tuple[np.ndarray, ...]:
     """Lay rails, (k, 3) each, as far below their tops as the blur of a surface lowers them.
 
     Where another rail is within `BLENDED` of the blur, in a switch, the surface is one ridge of both, higher than

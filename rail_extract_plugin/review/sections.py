@@ -54,16 +54,8 @@ class Rail:
 class Picture:
     """What a cross-section shows, metres to the right and up as seen along the track.
 
-    Attributes
-    ----------
-    points : (n, 2) array or None
-        None until they are read.
-    rails : (k, 2) array
-    missing : (k,) bool array
-        Whether a rail has no points here: it is where the line is drawn, or opposite to the other one.
-    head_width_m : float
-    note : str
-        What is missing, and why.
+    Points are None until they are read. A rail that is missing has no points here: it is where the line is drawn, or
+    opposite to the other one. The note says what is missing, and why.
     """
 
     points: np.ndarray | None
@@ -74,13 +66,7 @@ class Picture:
 
 
 class Sections:
-    """The cross-sections of a layer of findings.
-
-    Parameters
-    ----------
-    layer : QgsVectorLayer
-    found : sequence of Review
-    """
+    """The cross-sections of a layer of findings."""
 
     def __init__(self, layer: QgsVectorLayer, found: Sequence[Review]) -> None:
         self.cloud = cloud_of(layer)
@@ -159,12 +145,7 @@ class Sections:
 class ReadingTask(QgsTask):
     """Reads the points of all sections from the cloud, in a thread of QGIS.
 
-    Parameters
-    ----------
-    cloud : RunCloud
-    places : mapping of int to (3,) array
-    done : callable
-        Called in the main thread with the points by id, and with a sentence if they could not be read.
+    `done` is called in the main thread with the points by id, and with a sentence if they could not be read.
     """
 
     def __init__(
