@@ -104,7 +104,7 @@ THIN = Tolerances(
 )
 """For scanners in the air: a beam of 4 to 9 cm blends the head and the ballast."""
 
-BLUNT = replace(DENSE, band=BURIED, least_m=5.0, partner_m=0.05, below_m=0.12, below_share=1.0, above_m=0.06)
+BLUNT = replace(DENSE, band=BURIED, least_m=5.0, partner_m=0.05, below_m=0.12, below_share=3.0, above_m=0.06)
 """For clouds that blur a head to a round ridge. Any mound of its width is as round, and up to 4 m of one are opposite
 something else by chance. Beside its crest, the ridge falls by up to 5 cm; noise and a bed that slopes add as much. A
 limit that cut the lower side off would move the line, and one near the mean of the tops would lower it."""
