@@ -13,6 +13,8 @@ from .labels import Near, label, whole_heads
 from .lines import SINGLE_COVER, Lines, Marks, centred, find_lines, reach_at
 from .partner import have_partners, runs_inside
 from .pieces import (
+    LEAST_SINGLE_M,
+    lengths,
     links,
     long_enough,
     lower_than_beside,
@@ -34,14 +36,19 @@ DENSITY_QUANTILE = 0.75
 SINGLE_HEIGHT_M = 0.12
 """Least height above the bed of a rail without a partner: lower things are edges of slopes, kerbs and boards."""
 
+AS_HIGH_M = 0.03
+"""A rail without a partner may be lower if it stands as high as the rails of the square that have one, within this:
+ballast differs as much from track to track. Measured: 11 mm; kerbs and edges of slopes beside tracks 41 mm and more."""
+
 SINGLE_WIDTH = 0.2
 """Least width of a rail without a partner by that of a head. A single profile of the scanner is a bar of no width where
 the ground falls beside it, as at the edge of a road: measured 2 to 4 mm. Heads measure 68 mm, and 19 mm where a train
 hides most of them."""
 
-SINGLE_SLOPE = 0.4
-"""Steepest bed of a rail without a partner: that of the shoulder of a ballast bed is 0.67. Where the far side of a
-slope is hidden, its crest looks like a bar."""
+SINGLE_SLOPE = 0.3
+"""Steepest bed of a rail without a partner: cant of 180 mm is 0.12, and a shoulder beside the rail makes it 0.22 at
+most; at the shoulder of a ballast bed it is 0.67. Where the far side of a slope is hidden, its crest looks like a bar
+on a bed of 0.38 and more."""
 
 SHARP_WIDER_M = 0.016
 """Width beyond that of a head up to which a piece shows that the cloud is sharp. Measured over half of the rails of a
@@ -437,7 +444,8 @@ def _widths(
     width_m = beside.widths(piece)
     partnered = with_partner(kept.pairs, kept.paired)
     narrow = width_m < settings.head_width_m + tolerances.wider_m
-    alone = _stands_alone(kept, piece, width_m, shown.bed, settings, tolerances)
+    rails = kept.lines.height[partnered & narrow[piece] & (lengths(kept.lines.axis, piece) >= LEAST_SINGLE_M)[piece]]
+    alone = _stands_alone(kept, piece, width_m, rails, shown.bed, settings, tolerances)
     sharp = partnered & (width_m < settings.head_width_m + SHARP_WIDER_M)[piece]
     rounded = unsure = partnered & ~sharp
     if rounded.any():
@@ -448,16 +456,25 @@ def _widths(
 
 
 def _stands_alone(
-    kept: Kept, piece: np.ndarray, width_m: np.ndarray, bed: Bed, settings: Settings, tolerances: Tolerances
+    kept: Kept,
+    piece: np.ndarray,
+    width_m: np.ndarray,
+    rails: np.ndarray,
+    bed: Bed,
+    settings: Settings,
+    tolerances: Tolerances,
 ) -> np.ndarray:
     """Return which pieces, of (pieces,) widths, may be rails without a partner, (pieces,) bool.
 
-    They are as narrow as a head and no narrower, stand as high as a rail does that is not buried in ballast, and their
-    bed is not steeper than a track's.
+    They are as narrow as a head and no narrower, stand as high as a rail does that is not buried in ballast, or as the
+    rails that have a partner, (k,) heights, and their bed is not steeper than a track's.
     """
     narrow = width_m < settings.head_width_m + tolerances.wider_single_m
     narrow &= width_m >= SINGLE_WIDTH * settings.head_width_m
-    high = _mean(kept.lines.height, piece) >= SINGLE_HEIGHT_M
+    height_m = _mean(kept.lines.height, piece)
+    high = height_m >= SINGLE_HEIGHT_M
+    if len(rails):
+        high |= np.abs(height_m - np.median(rails)) < AS_HIGH_M
     return narrow & high & (_mean(bed.slopes(kept.lines.axis), piece) <= SINGLE_SLOPE)
 
 
