@@ -233,6 +233,8 @@ def _candidates(network: LineNetwork) -> np.ndarray:
     They are between two junctions, or at one, or where two lines come closest to each other without meeting: where
     flangeways cut the rails that cross, each line runs on into a slip curve.
     """
+    if not network.lines:
+        return np.empty((0, 2))
     nodes = network.nodes[network.degrees() > 2]
     pairs = cKDTree(nodes).query_pairs(2 * NODE_M, output_type="ndarray") if len(nodes) else np.empty((0, 2), dtype=int)
     places = np.concatenate([nodes[pairs].mean(axis=1), nodes, _Parts.of(network).approaches()])
