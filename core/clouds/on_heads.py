@@ -49,8 +49,9 @@ HEAD_M, RAIL_M = 0.04, 0.20
 """Depths below the crown down to which points are on the head, and on web and foot and on the sleeper below the tallest
 rails. The faces of a head end at 37 mm on 60E1, and at 45 mm on the tallest head of the standards."""
 
-NOISE_SIGMAS = 2.0
-"""Standard deviations of the noise of heights by which points on the lower ends of faces may be deeper."""
+NOISE_SIGMAS, SCATTER_SIGMAS = 3.0, 2.0
+"""Standard deviations of the noise of heights by which points on the lower ends of faces may be deeper, and of the
+scatter of points about a face by which others may be off it: beams from the air see no upright face."""
 
 FACE_M = (0.015, 0.03)
 """Depths below the crown between which the faces of a head are upright, whatever its wear: they show how wide it is."""
@@ -167,10 +168,13 @@ def on_heads(xyz: np.ndarray, found: bool = False) -> np.ndarray:
         depth_m += step
     noise_m = _noise(depth_m)
     head_m = max(FOUND_HEAD_M, FOUND_SIGMAS * noise_m) if found else HEAD_M + NOISE_SIGMAS * noise_m
-    recessed = np.ones(len(xyz), dtype=bool)
+    off_m = np.full(len(xyz), np.inf, dtype=np.float32)
     for edge in faces.astype(np.float32).T:
-        recessed &= np.abs(across_m - edge[place]) > RECESS_M
-    recessed &= depth_m > FACE_M[1] + NOISE_SIGMAS * noise_m
+        np.fmin(off_m, np.abs(across_m - edge[place]), out=off_m)
+    on_faces = (depth_m > FACE_M[0]) & (depth_m <= FACE_M[1]) & np.isfinite(off_m)
+    scatter_m = 1.4826 * float(np.median(off_m[on_faces])) if on_faces.any() else np.inf
+    recessed = np.isfinite(off_m) & (off_m > RECESS_M + SCATTER_SIGMAS * scatter_m)
+    recessed &= depth_m > FACE_M[1] + noise_m
     return ~((recessed | (depth_m > head_m)) & (depth_m <= RAIL_M))
 
 
