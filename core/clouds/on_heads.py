@@ -56,8 +56,8 @@ scatter of points about a face by which others may be off it: beams from the air
 FACE_M = (0.015, 0.03)
 """Depths below the crown between which the faces of a head are upright, whatever its wear: they show how wide it is."""
 
-FACES_PERCENT, MIN_ON_FACES = (20.0, 80.0), 5
-"""Percentiles of the offsets of the points on faces that tell both edges of a head, or twice the one that is seen: of
+FACES_PERCENT, MIN_ON_FACES = (20.0, 80.0), 10
+"""Percentiles of the offsets of the points on faces that tell both edges of a head, or twice the one that is seen; of
 five points, one may be a stray."""
 
 FOUND_HEAD_M, FOUND_SIGMAS = 0.036, 5.0
@@ -65,9 +65,9 @@ FOUND_HEAD_M, FOUND_SIGMAS = 0.036, 5.0
 clouds from the air. The search takes all of the web down to 50 mm below the top where a rail is seen from the side; few
 points of a rail at such angles show its faces. The lowest part of a face may go."""
 
-RECESS_M = 0.015
-"""Least distance of a web from the faces above it, and of the tip of a foot: 20 mm or more on every standard, and the
-undersides of heads are between."""
+RECESS_M = (0.015, 0.05)
+"""Distances of a web from the face above it: 20 mm or more on every standard, and the undersides of heads are between;
+beyond half of the widest head and half a web, what is there may be the other face."""
 
 FULL_SHARE = 0.5
 """Points in the crown as a share of those in the fullest part of the head: a scanner to one side sees more of the face
@@ -173,7 +173,7 @@ def on_heads(xyz: np.ndarray, found: bool = False) -> np.ndarray:
         np.fmin(off_m, np.abs(across_m - edge[place]), out=off_m)
     on_faces = (depth_m > FACE_M[0]) & (depth_m <= FACE_M[1]) & np.isfinite(off_m)
     scatter_m = 1.4826 * float(np.median(off_m[on_faces])) if on_faces.any() else np.inf
-    recessed = np.isfinite(off_m) & (off_m > RECESS_M + SCATTER_SIGMAS * scatter_m)
+    recessed = (off_m > RECESS_M[0] + SCATTER_SIGMAS * scatter_m) & (off_m < RECESS_M[1])
     recessed &= depth_m > FACE_M[1] + noise_m
     return ~((recessed | (depth_m > head_m)) & (depth_m <= RAIL_M))
 
