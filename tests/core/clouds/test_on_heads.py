@@ -38,7 +38,7 @@ def test_what_is_below_a_head_is_left_out(gradient, noise_m):
 @settings(max_examples=20, deadline=None)
 def test_heads_alone_are_kept(per_m, noise_m, seed):
     xyz, part = rail(12.0, per_m, seed, noise_m)
-    assert on_heads(xyz[part == HEAD]).mean() >= 0.95
+    assert on_heads(xyz[part == HEAD]).mean() >= 0.99
 
 
 def test_a_rail_far_beside_the_scanner_shows_its_web_as_well_as_its_head():
@@ -56,16 +56,6 @@ def test_a_rail_far_beside_the_scanner_shows_its_web_as_well_as_its_head():
     assert not kept[z < -0.07].any()
     assert found[z > -0.02].mean() > 0.99
     assert found[(z < -0.045) & (z > -0.06)].mean() < 0.3 * kept[(z < -0.045) & (z > -0.06)].mean()
-
-
-def test_a_web_right_below_the_face_that_a_tripod_sees_is_left_out():
-    random = np.random.default_rng(4)
-    x, z = random.uniform(0, 40, 3000), random.uniform(-0.06, 0.0, 3000)
-    across = np.interp(z, [-0.06, -0.045, -0.0375, -0.008, 0.0], [0.01, 0.012, 0.036, 0.036, 0.0])
-    xyz = np.column_stack([x, across, z]) + random.normal(0, 0.0015, (3000, 3))
-    kept = on_heads(xyz)
-    assert kept[z > -0.035].mean() > 0.99
-    assert kept[z < -0.048].mean() < 0.1
 
 
 @pytest.mark.parametrize("share", [0.1, 0.5])
