@@ -38,7 +38,7 @@ def test_what_is_below_a_head_is_left_out(gradient, noise_m):
 @settings(max_examples=20, deadline=None)
 def test_heads_alone_are_kept(per_m, noise_m, seed):
     xyz, part = rail(12.0, per_m, seed, noise_m)
-    assert on_heads(xyz[part == HEAD]).mean() >= 0.95
+    assert on_heads(xyz[part == HEAD]).mean() >= 0.99
 
 
 def test_a_rail_far_beside_the_scanner_shows_its_web_as_well_as_its_head():
