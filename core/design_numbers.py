@@ -65,7 +65,7 @@ TURNS = Kind(0.0, MAX_TURNS, f"an element turns by up to {MAX_TURNS:g} revolutio
 
 
 def checked(value: float, kind: Kind, where: str, name: str) -> float:
-    """Return a number if it is of a kind; `where` states it as `name`, for the message of the DesignNumberError.
+    """Return a number if it is of a kind, else raise a DesignNumberError that names `name` and `where` it stands.
 
     Examples
     --------

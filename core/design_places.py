@@ -17,7 +17,7 @@ MAX_SPIKE_M = 10_000.0
 
 
 def check_places(xy: np.ndarray, where: str, unit_m: float = 1.0) -> np.ndarray:
-    """Return places, (n, 2), in units of `unit_m` metres, if all are on the map; `where` has them, for the message."""
+    """Return places, (n, 2), in units of `unit_m` metres, if all are on the map; messages name `where` they stand."""
     wrong = xy[~are_places(xy, unit_m)]
     for value in wrong.ravel() if len(wrong) else ():
         checked(float(value) * unit_m, NUMBER, where, "coordinate")

@@ -59,7 +59,7 @@ class LayerLines:
     ) -> LayerLines:
         """Check the lines of a layer, and put them into a local frame; `system` is that of `system_of`.
 
-        `name` is that of the layer's parameter, for messages. Raises RailExtractError if there is no line, or one with
+        Messages name the parameter of the layer, `name`. Raises RailExtractError if there is no line, or one with
         an impossible vertex.
         """
         crs_wkt, horizontal_unit_m, vertical_unit_m = system
