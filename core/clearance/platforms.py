@@ -1,0 +1,184 @@
+"""Platform edges: the offset and the height of the edge beside a track, metre by metre."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import median_filter
+
+
+ASIDE_M, HEIGHT_M = (1.2, 3.0), (0.12, 1.4)
+"""Where edges of platforms are, aside and above the rail tops."""
+
+LAYER_M = 0.04
+"""Thickness of the layers among which the level face is: paving is even within it."""
+
+FULLEST, LEAST_POINTS, LEAST_WIDTH_M = 3, 30, 0.3
+"""The level face is the highest of so many fullest layers that has so many points over such a width."""
+
+ROUNDS, LEVEL_SIGMA_M, STEEPEST = 4, 0.012, 0.10
+"""Rounds of the fit of the level face, distance up to which points count, and steepest fall of a platform across."""
+
+BEHIND_M, ABOVE_M, FULL_SHARE = 0.35, (0.10, 0.60), 0.3
+"""Behind the edge and above the level there are fewer points than this share of those on it; else it is the floor of a
+wagon, or the foot of a wall."""
+
+FACE_M, FACE_DEPTH_M, FACE_LEAST = (0.015, 0.075), 0.05, 5
+"""The vertical face: how far below the level its points are, over which depth, and how many are needed."""
+
+TRIMMED = 0.1
+"""Share of the points of the face on either side that its mean leaves out: bolts, dirt, joints."""
+
+LONGEST_HOLE_M, LARGEST_STEP_M, SHORTEST_M = 3.0, 0.10, 10.0
+"""Between metres of one platform: longest hole and largest step; and the shortest platform."""
+
+STRAY_M, MEDIAN_OF = 0.03, 5
+"""What deviates so far from the median of so many metres is no edge."""
+
+NOMINAL_MM, NOMINAL_WITHIN_MM = (550, 760), 60.0
+"""Heights of the technical specification for interoperability, and how near a platform is to be one."""
+
+LEVEL, EDGE = 0.05, 0.10
+"""Points at most so far above the level, and so far in front of the edge, are of the platform."""
+
+
+@dataclass(frozen=True)
+class Edge:
+    """A metre of a platform edge on one side of a track: s, distance from the middle, height, and standard errors."""
+
+    s: float
+    side: int
+    offset_m: float
+    height_m: float
+    sigma_m: float
+    sigmaz_m: float
+
+
+@dataclass(frozen=True)
+class Platform:
+    """An edge along a track; (n,) arrays, one value for each metre."""
+
+    course: int
+    side: int
+    s: np.ndarray
+    offset_m: np.ndarray
+    height_m: np.ndarray
+    sigma_m: float
+    sigmaz_m: float
+
+    @property
+    def nominal_mm(self) -> int | None:
+        """The nearest nominal height; None if none is near."""
+        mean = 1000 * float(self.height_m.mean())
+        best = min(NOMINAL_MM, key=lambda nominal: abs(nominal - mean))
+        return best if abs(best - mean) <= NOMINAL_WITHIN_MM else None
+
+    def near(self, s: np.ndarray) -> np.ndarray:
+        """Return the number of the metre nearest to chainages, (m,); -1 beyond the platform."""
+        at = np.clip(np.searchsorted(self.s, s), 1, max(len(self.s) - 1, 1))
+        at = np.where(np.abs(self.s[at - 1] - s) <= np.abs(self.s[np.minimum(at, len(self.s) - 1)] - s), at - 1, at)
+        at = np.minimum(at, len(self.s) - 1)
+        return np.where(np.abs(self.s[at] - s) <= LONGEST_HOLE_M, at, -1)
+
+
+def edges_of(s: np.ndarray, v: np.ndarray, w: np.ndarray) -> list[Edge]:
+    """Return the metres of platform edges in points, (n,) each."""
+    strip = (np.abs(v) > ASIDE_M[0]) & (np.abs(v) < ASIDE_M[1]) & (w > HEIGHT_M[0]) & (w < HEIGHT_M[1] + ABOVE_M[1])
+    s, v, w = s[strip], v[strip], w[strip]
+    found = []
+    for side in (1, -1):
+        mine = np.flatnonzero(side * v > 0)
+        metre = np.floor(s[mine]).astype(np.int64)
+        order = np.argsort(metre, kind="stable")
+        for part in np.split(mine[order], np.flatnonzero(np.diff(metre[order])) + 1) if len(mine) else ():
+            edge = _edge(float(np.floor(s[part[0]])) + 0.5, side, np.abs(v[part]), w[part])
+            found += [edge] if edge else []
+    return found
+
+
+def _edge(s: float, side: int, aside: np.ndarray, w: np.ndarray) -> Edge | None:
+    """Return the edge within a metre; None if there is none."""
+    level = _level(aside, w)
+    if level is None:
+        return None
+    height, slope, on_level = level
+    first = float(np.percentile(aside[on_level], 1))
+    behind = (aside > first) & (aside < first + BEHIND_M)
+    rise = w - height - slope * aside
+    above = int((behind & (rise > ABOVE_M[0]) & (rise < ABOVE_M[1])).sum())
+    if above >= FULL_SHARE * max(int((behind & on_level).sum()), 1):
+        return None
+    face = (rise < -FACE_M[0]) & (rise > -FACE_M[1]) & (aside < first + FACE_DEPTH_M)
+    if face.sum() >= FACE_LEAST:
+        near = aside[face] <= np.percentile(aside[face], 1) + FACE_DEPTH_M
+        kept = np.sort(aside[face][near])
+        cut = int(TRIMMED * len(kept))
+        kept = kept[cut : len(kept) - cut] if cut else kept
+        offset, sigma = float(kept.mean()), float(kept.std() / np.sqrt(len(kept)))
+    else:
+        offset, sigma = _first_of_level(aside[on_level])
+    residual = rise[on_level]
+    sigmaz = float(residual.std() / np.sqrt(on_level.sum()) * 2)
+    return Edge(s, side, offset, height + slope * offset, max(sigma, 1e-4), max(sigmaz, 1e-4))
+
+
+def _level(aside: np.ndarray, w: np.ndarray) -> tuple[float, float, np.ndarray] | None:
+    """Return height and slope of the level face, and which points are on it; None without one."""
+    layer = np.floor(w / LAYER_M).astype(np.int64)
+    count = np.bincount(layer - layer.min())
+    both = count + np.append(count[1:], 0)  # a face may lie across the border of two layers
+    best = np.sort(np.argsort(-both, kind="stable")[:FULLEST])[::-1] + layer.min()
+    for one in best:
+        on_level = (layer == one) | (layer == one + 1)
+        middle, slope = float(np.median(w[on_level])), 0.0
+        for _ in range(ROUNDS):
+            on_level = np.abs(w - middle - slope * aside) <= LEVEL_SIGMA_M if slope or middle else on_level
+            if on_level.sum() < LEAST_POINTS or np.ptp(aside[on_level]) < LEAST_WIDTH_M:
+                break
+            slope, middle = np.polyfit(aside[on_level], w[on_level], 1).tolist()
+        else:
+            if abs(slope) < STEEPEST and middle + slope * float(np.median(aside[on_level])) < HEIGHT_M[1]:
+                return middle, slope, on_level
+    return None
+
+
+def _first_of_level(aside: np.ndarray) -> tuple[float, float]:
+    """Return where a level face begins that is seen from above only, and the standard error of that."""
+    ordered = np.sort(aside)
+    spacing = float(np.ptp(ordered)) / max(len(ordered) - 1, 1)
+    noise = 0.005
+    return float(ordered[0]) + 2 * noise - spacing, max(spacing, noise)
+
+
+def platforms_of(course: int, edges: Sequence[Edge]) -> list[Platform]:
+    """Join the metres of a track into platforms."""
+    return [one for side in (1, -1) for one in _runs(course, side, [edge for edge in edges if edge.side == side])]
+
+
+def _runs(course: int, side: int, edges: Sequence[Edge]) -> Iterator[Platform]:
+    """Yield the platforms on one side."""
+    if not edges:
+        return
+    rows = np.array(sorted((one.s, one.offset_m, one.height_m, one.sigma_m, one.sigmaz_m) for one in edges))
+    steady = np.abs(rows[:, 1:3] - median_filter(rows[:, 1:3], (MEDIAN_OF, 1), mode="nearest")) <= STRAY_M
+    rows = rows[steady.all(axis=1)]
+    step = np.abs(np.diff(rows[:, 1:3], axis=0)).max(axis=1, initial=0.0) > LARGEST_STEP_M
+    breaks = np.flatnonzero(step | (np.diff(rows[:, 0]) > LONGEST_HOLE_M)) + 1
+    for part in np.split(rows, breaks):
+        if len(part) and part[-1, 0] - part[0, 0] + 1.0 >= SHORTEST_M:
+            sigma, sigmaz = np.sqrt(np.mean(part[:, 3:] ** 2, axis=0))
+            yield Platform(course, side, *part[:, :3].T, float(sigma), float(sigmaz))
+
+
+def on_platforms(platforms: Sequence[Platform], s: np.ndarray, v: np.ndarray, w: np.ndarray) -> np.ndarray:
+    """Return which points, (n,), are of platforms of their track."""
+    found = np.zeros(len(s), dtype=bool)
+    for one in platforms:
+        at = one.near(s)
+        mine = (at >= 0) & (one.side * v >= one.offset_m[at] - EDGE) & (w <= one.height_m[at] + LEVEL)
+        found |= mine
+    return found
+
+

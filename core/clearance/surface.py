@@ -1,0 +1,146 @@
+"""How deep the surface of an object is inside a profile: a fit to its points, because the deepest of many points is noise.
+
+Of N points of a plane, the deepest lies two to three standard deviations of the noise too deep. See docs/clearance.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+ALONG_M, UP_M, ACROSS_M = 0.15, 0.35, 0.13
+"""Half the size of the part of an object that is fitted: small enough that a mast, a wall or a sign is a plane or a
+cylinder there, and large enough for some dozens of points at 400 per square metre."""
+
+DEEPEST = 6
+"""The median of so many points leads to the deepest part: a single one is noise."""
+
+LEAST_POINTS = 8
+"""Fewer points make no surface: four unknowns leave too little to judge them by."""
+
+ENVELOPE_ROUNDS, PLAIN_ROUNDS = 12, 4
+"""Rounds of least squares, the first of which find the upper envelope, the others its middle."""
+
+BELOW_WEIGHT = 0.08
+"""Weight of points below the envelope: those of what stands behind."""
+
+NEAR_SIGMAS, STRAY_SIGMAS = 3.0, 4.0
+"""Points within so many standard deviations of the noise are of the surface; points further above deny it."""
+
+STRAY_SHARE, STRAY_LEAST = 0.08, 3
+"""Share and number of points above the surface from which the object is a bush and has none."""
+
+DROP_M = 0.014
+"""The last fit holds where the surface is at most so far behind its deepest line: there a parabola follows a pole of
+11 cm within a millimetre. Places are chosen along the track, not by the noise of the points."""
+
+SURE_SLOPE = 2.0
+"""Standard errors from which a slope or a bend counts: an imagined slope would deepen the end of the surface."""
+
+
+@dataclass(frozen=True)
+class Surface:
+    """The deepest place of the surface of part of an object.
+
+    Attributes
+    ----------
+    depth_m, sigma_m : float
+        Penetration, positive inside, and its standard error by the fit.
+    s, v, w : float
+        The place.
+    is_sure : bool
+        Whether enough points make a surface or a bush.
+    """
+
+    depth_m: float
+    sigma_m: float
+    s: float
+    v: float
+    w: float
+    is_sure: bool
+
+
+Depth = Callable[[np.ndarray], np.ndarray]
+"""Returns the penetration of places, (n, 3): s, v and w."""
+
+
+def surface_of(
+    place: np.ndarray, depth: np.ndarray, centre: np.ndarray, inward: np.ndarray, noise_m: float, depth_at: Depth
+) -> Surface:
+    """Fit the deepest part of an object, and measure how deep the fitted surface is.
+
+    The depth of points beside a corner of the profile bends where the surface does not, so that not the depth is
+    fitted, but how far inwards the surface is, seen across the nearest edge.
+
+    Parameters
+    ----------
+    place : (n, 3) array
+        s, v and w of the points around, also of those outside of the profile.
+    depth : (n,) array
+        Penetration of the points.
+    centre : (3,) array
+        Where the deepest points are.
+    inward : (2,) array
+        Unit vector in v and w, perpendicular to the nearest edge of the profile.
+    """
+    off = place - centre
+    s, t, h = off[:, 0], off[:, 1] * inward[1] - off[:, 2] * inward[0], off[:, 1:] @ inward
+    near = (np.abs(s) <= ALONG_M) & (np.abs(t) <= UP_M) & (np.abs(h) <= ACROSS_M)
+    place, depth, s, t, h = place[near], depth[near], s[near], t[near], h[near]
+    deepest = np.argsort(-depth, kind="stable")
+    if len(depth) < LEAST_POINTS:
+        few = deepest[:3]
+        middle = place[few].mean(axis=0) if len(few) else np.full(3, np.nan)
+        return Surface(float(depth[few].mean()) if len(few) else -np.inf, noise_m, *middle.tolist(), False)
+    design = np.column_stack([np.ones(len(s)), t, s, s**2])
+    chosen = _on_surface(design, h, noise_m)
+    if chosen is None:
+        third = deepest[2]
+        return Surface(float(depth[third]), 2 * noise_m, *place[third].tolist(), True)
+    fitted, sigma = _smoothed(design[chosen], h[chosen], noise_m)
+    places = centre + np.column_stack([s[chosen], np.outer(t[chosen], [inward[1], -inward[0]]) + np.outer(fitted, inward)])
+    depths = depth_at(places)
+    at = int(np.argmax(depths))
+    return Surface(float(depths[at]), float(sigma[at]), *places[at].tolist(), True)
+
+
+def _on_surface(design: np.ndarray, h: np.ndarray, noise_m: float) -> np.ndarray | None:
+    """Return which points, (n,) bool, are of the surface; None if too many points lie above one."""
+    weights = np.ones(len(h))
+    for _ in range(ENVELOPE_ROUNDS):
+        c = _solved(design, h, weights)
+        weights = np.where(h > design @ c, 1.0, BELOW_WEIGHT)
+    near = np.abs(h - design @ c) <= NEAR_SIGMAS * noise_m
+    for _ in range(PLAIN_ROUNDS):
+        if near.sum() < LEAST_POINTS:
+            return None
+        c = _solved(design[near], h[near])
+        bend = design[:, 2:] @ c[2:]
+        on_top = bend >= bend[near].max() - DROP_M
+        near = on_top & (np.abs(h - design @ c) <= NEAR_SIGMAS * noise_m)
+    above = int((on_top & (h - design @ c > STRAY_SIGMAS * noise_m)).sum())
+    return None if near.sum() < LEAST_POINTS or above >= max(STRAY_LEAST, STRAY_SHARE * len(h)) else near
+
+
+def _smoothed(design: np.ndarray, h: np.ndarray, noise_m: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return the surface at its points, a plane or cylinder whose slopes and bend surely differ from zero, and errors."""
+    kept = [0, 1, 2, 3]
+    while True:
+        own = design[:, kept]
+        c = _solved(own, h)
+        off = h - own @ c
+        scatter = max(float(np.sqrt(off @ off / max(len(off) - len(kept), 1))), 0.5 * noise_m)
+        spread = scatter**2 * np.linalg.pinv(own.T @ own)
+        sure = np.abs(c) / np.sqrt(np.maximum(np.diag(spread), 1e-18))
+        weakest = int(np.argmin(np.where(np.arange(len(kept)) > 0, sure, np.inf)))
+        if len(kept) == 1 or sure[weakest] >= SURE_SLOPE:
+            return own @ c, np.sqrt(np.einsum("ij,jk,ik->i", own, spread, own))
+        del kept[weakest]
+
+
+def _solved(design: np.ndarray, values: np.ndarray, weights: np.ndarray | None = None) -> np.ndarray:
+    """Return the coefficients of weighted least squares; the smallest ones where the points do not tell them."""
+    weighted = design if weights is None else design * weights[:, None]
+    return np.linalg.lstsq(weighted.T @ design, weighted.T @ values, rcond=1e-10)[0]
