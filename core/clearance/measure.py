@@ -193,7 +193,7 @@ def measure(
         request.zero,
         tuple(courses),
         tuple(objects),
-        tuple(_stations(courses, at, found, settings, wide[at]) for at in range(len(courses))),
+        tuple(_stations(courses, at, swept, found, settings, wide[at]) for at in range(len(courses))),
         tuple(platforms),
         tuple(wires),
         tuple(_cross_section(one, courses, swept, settings, wide) for one in objects[:PICTURES]),
@@ -257,21 +257,20 @@ def _nodes(found: Mapping[Key, Section], at: int) -> Nodes:
 
 
 def _stations(
-    courses: Sequence[Course], at: int, found: Mapping[Key, Section], settings: Settings, wide: np.ndarray
+    courses: Sequence[Course], at: int, swept: Swept, found: Mapping[Key, Section], settings: Settings, wide: np.ndarray
 ) -> Stations:
     """Return the stations of a track."""
     course = courses[at]
     s = settings.step_m * np.arange(int(course.length_m / settings.step_m) + 1)
     bands = np.full((2, len(s) * 2 * len(BANDS_M)), np.nan)
-    points = np.zeros(len(s), dtype=np.int64)
+    number = np.minimum(np.rint(course.s / settings.step_m).astype(np.int64), len(s) - 1)
+    points = np.bincount(number, swept.seen[at], len(s)).astype(np.int64)
     mine = [one for key, one in sorted(found.items()) if key[0] == at]
     if mine:
         least = Least.joined([one.least for one in mine])
         inside = least.cell < bands.shape[1]
         for row, values in zip(bands, (least.aside_m, least.margin_m)):
             row[least.cell[inside]] = np.where(np.isfinite(values[inside, -1]), values[inside, -1], np.nan)
-        numbers, counts = np.concatenate([one.counts for one in mine]).T
-        np.add.at(points, np.minimum(numbers, len(s) - 1), counts)
     aside, margin = bands.reshape(2, len(s), 2, len(BANDS_M))
     sides = neighbours(courses, at, settings.least_distance_m, settings.profile.is_of_ebo)
     nearest = course.station(s)

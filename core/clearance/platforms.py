@@ -31,6 +31,9 @@ FACE_M, FACE_DEPTH_M, FACE_LEAST = (0.015, 0.075), 0.05, 5
 TRIMMED = 0.1
 """Share of the points of the face on either side that its mean leaves out: bolts, dirt, joints."""
 
+EDGE_NOISE_M, EVEN_M = 0.03, 0.3
+"""Six times the usual noise, behind which a level face is full; and the width over which it is evenly so."""
+
 LONGEST_HOLE_M, LARGEST_STEP_M, SHORTEST_M = 3.0, 0.10, 10.0
 """Between metres of one platform: longest hole and largest step; and the shortest platform."""
 
@@ -145,11 +148,14 @@ def _level(aside: np.ndarray, w: np.ndarray) -> tuple[float, float, np.ndarray] 
 
 
 def _first_of_level(aside: np.ndarray) -> tuple[float, float]:
-    """Return where a level face begins that is seen from above only, and the standard error of that."""
-    ordered = np.sort(aside)
-    spacing = float(np.ptp(ordered)) / max(len(ordered) - 1, 1)
-    noise = 0.005
-    return float(ordered[0]) + 2 * noise - spacing, max(spacing, noise)
+    """Return where a level face begins that is seen from above only, and the standard error of that.
+
+    Its points are as dense everywhere, so that those beyond the noise of the first one tell how wide the face is there.
+    """
+    inner = float(aside.min()) + EDGE_NOISE_M
+    density = max(int(((aside >= inner) & (aside < inner + EVEN_M)).sum()), 1) / EVEN_M
+    before = int((aside < inner).sum())
+    return inner - before / density, float(np.sqrt(before + 1)) / density
 
 
 def platforms_of(course: int, edges: Sequence[Edge]) -> list[Platform]:

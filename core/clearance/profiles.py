@@ -134,24 +134,6 @@ def custom(points: Sequence[tuple[float, float]], name: str) -> Profile:
     return Profile(CUSTOM, tuple(ring), REFERENCE, name, said)
 
 
-def read_custom(path: Path) -> Profile:
-    """Read a CSV file with the columns v_m and w_m; errors as for `custom`."""
-    try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            text = file.read()
-        dialect = csv.Sniffer().sniff(text.splitlines()[0], delimiters=",;\t") if text.strip() else csv.excel
-        rows = list(csv.DictReader(text.splitlines(), dialect=dialect))
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise ParameterError(f"PROFILE_FILE {path.name} can't be read: give a CSV file or a layer.") from error
-    if not rows or any(column not in rows[0] for column in COLUMNS):
-        raise ParameterError(f"PROFILE_FILE {path.name} lacks the columns {' and '.join(COLUMNS)}: name them so.")
-    try:
-        points = [(float(row[COLUMNS[0]]), float(row[COLUMNS[1]])) for row in rows]
-    except (TypeError, ValueError) as error:
-        raise ParameterError(f"PROFILE_FILE {path.name} has a row without two numbers: correct or delete it.") from error
-    return custom(points, path.name)
-
-
 def _crosses_itself(ring: Sequence[tuple[float, float]]) -> bool:
     """Return whether two edges of a ring that are not neighbours meet; outlines have few edges."""
     edges = list(zip(ring, [*ring[1:], ring[0]]))

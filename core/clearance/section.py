@@ -109,14 +109,11 @@ class Section:
     Attributes
     ----------
     least : Least
-    counts : (k, 2) int array
-        Station, and number of points within reach.
     vehicle : tuple of tuple of float
         Start of the part of the track, v and w of the middles of cells that the own vehicle fills.
     """
 
     least: Least
-    counts: np.ndarray
     edges: tuple[Edge, ...]
     nodes: Nodes
     parts: Parts
@@ -134,7 +131,7 @@ def measure_section(
     points = read_points(course, section, files, rules)
     context.progress.check()
     is_vehicle, cells = own_vehicle(points.s, points.v, points.w)
-    counts, points = _counts(points, rules.step_m), points.kept(~is_vehicle)
+    points = points.kept(~is_vehicle)
     nodes = nodes_of(points.s, points.v, points.w, lambda s: course.at(s, course.curvature))
     context.progress.check()
     edges = edges_of(points.s, points.v, points.w)
@@ -142,7 +139,6 @@ def measure_section(
     kind = _kinds(points, edges, nodes)
     return Section(
         least_of(points.kept(points.is_own & (kind != WIRE)), rules),
-        counts,
         tuple(edge for edge in edges if own[0] <= edge.s < own[1]),
         nodes.part((nodes.s >= own[0]) & (nodes.s < own[1])),
         parts_of(_near(points, kind, nodes), courses, own, rules.outline, partial(depth_of, course, rules)),
@@ -201,12 +197,6 @@ def _deepest_of_cells(points: Points) -> np.ndarray:
     order = np.lexsort((-points.depth, number))
     first = np.append(True, np.diff(number[order]) != 0)
     return np.sort(order[first])
-
-
-def _counts(points: Points, step_m: float) -> np.ndarray:
-    """Return the stations and the number of points of each, (k, 2)."""
-    found, count = np.unique(np.rint(points.s[points.is_own] / step_m).astype(np.int64), return_counts=True)
-    return np.column_stack([found, count])
 
 
 def least_of(points: Points, rules: Rules) -> Least:

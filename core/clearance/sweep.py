@@ -97,12 +97,26 @@ class Swept:
         Points within ten metres of a track in plan, at any height.
     above_m : float
         Median height of these points over the tracks, NaN without any.
+    seen : tuple of (n,) int arrays
+        Points within reach in plan, at any height, at the stations of each track.
     """
 
     files: tuple[SortedFile, ...]
     census: np.ndarray
     nearby: int
     above_m: float
+    seen: tuple[np.ndarray, ...]
+
+
+@dataclass(frozen=True)
+class SweptFile:
+    """What one file gave; `seen` has stations and numbers of points by track, see `Swept`."""
+
+    points: SortedFile
+    census: np.ndarray
+    nearby: int
+    above_m: float
+    seen: Mapping[int, tuple[np.ndarray, np.ndarray]]
 
 
 def sweep(request: Request, plan: Plan, folder: Path, runner: Runner, progress: Progress = SILENT) -> Swept:
@@ -116,12 +130,17 @@ def sweep(request: Request, plan: Plan, folder: Path, runner: Runner, progress: 
             label, weight = f"Reading {header.path.name}", READ_S * (header.point_count + 1)
             tasks[number] = Task(label, sweep_file, (request, number, plan, touched, folder), weight=weight)
     found = [one for _, one in runner.run(tasks, progress)]
-    heights = [above for _, _, _, above in found if np.isfinite(above)]
+    seen = tuple(np.zeros(len(course.xyz), dtype=np.int64) for course in plan.courses)
+    for one in found:
+        for at, (stations, counts) in one.seen.items():
+            seen[at][stations] += counts
+    heights = [one.above_m for one in found if np.isfinite(one.above_m)]
     return Swept(
-        tuple(one for one, *_ in found),
-        np.sum([np.zeros(LAST_CLASS + 1, dtype=np.int64), *(census for _, census, *_ in found)], axis=0),
-        sum(nearby for _, _, nearby, _ in found),
+        tuple(one.points for one in found),
+        np.sum([np.zeros(LAST_CLASS + 1, dtype=np.int64), *(one.census for one in found)], axis=0),
+        sum(one.nearby for one in found),
         float(np.median(heights)) if heights else np.nan,
+        seen,
     )
 
 
@@ -144,12 +163,13 @@ def _touching(areas: np.ndarray, extent: Sequence[float]) -> np.ndarray:
 
 def sweep_file(
     request: Request, number: int, plan: Plan, touched: Sequence[np.ndarray], folder: Path, context: Context
-) -> tuple[SortedFile, np.ndarray, int, float]:
-    """Sort the points of one file into sections; a task. Also returns census, points near tracks and their height."""
+) -> SweptFile:
+    """Sort the points of one file into sections; a task."""
     header, mine = request.headers[number], SortedFile.new_folder(folder)
     near = {at: Cells.around(plan.courses[at], plan.far_m) for at, areas in enumerate(touched) if len(areas)}
     wide = {at: Cells.around(plan.courses[at], max(NEARBY_M, plan.far_m)) for at in near}
     counts: Counter[Key] = Counter()
+    seen = {at: np.zeros(len(plan.courses[at].xyz), dtype=np.int64) for at in near}
     census, nearby, heights = np.zeros(LAST_CLASS + 1, dtype=np.int64), 0, []
     wanted = [code for code in EVERY_CLASS if code not in plan.left_out]
     chunks = read_classes(header.path, wanted, context.progress, np.concatenate(touched), request.leave_out)
@@ -163,12 +183,15 @@ def sweep_file(
             within, station = wide[at].find(local[:, :2])
             nearby += len(within)
             some = local[within]
+            seen[at] += np.bincount(near[at].find(some[:, :2])[1], minlength=len(course.xyz))
             heights.append(local[within[::STRIDE], 2] - course.xyz[station[::STRIDE], 2])
             for key, points in _sorted(course, near[at], plan, some, codes[within]):
                 append(mine, (at, key), points)
                 counts[at, key] += len(points)
     above = np.concatenate([np.empty(0), *heights])
-    return SortedFile(str(mine), counts), census, nearby, float(np.median(above)) if len(above) else np.nan
+    above_m = float(np.median(above)) if len(above) else np.nan
+    sparse = {at: (np.flatnonzero(one), one[one > 0]) for at, one in seen.items()}
+    return SweptFile(SortedFile(str(mine), counts), census, nearby, above_m, sparse)
 
 
 STRIDE = 100

@@ -37,6 +37,9 @@ NEAR_M = 0.05, 0.035
 WINDOWS_M = ((-1.5, 1.5), (-2.2, 0.0), (0.0, 2.2))
 """Parts around a place over which the wire is straight: the steadiest counts, so that a kink at a support stays."""
 
+STEADY = 1.2
+"""The first of these parts counts whose points scatter at most so many times as much as those of the steadiest."""
+
 LEAST_FITTED = 6
 """Points that a straight piece needs."""
 
@@ -195,17 +198,19 @@ def _refined(points: np.ndarray, s: float, curvature: float) -> tuple[float, flo
 
     The wire is straight where the track bends: in the frame of the track it is a parabola of the known curvature.
     """
-    best: tuple[float, float, float] | None = None
+    fits = []
     for low, high in WINDOWS_M:
         i, j = np.searchsorted(points[:, 0], (s + low, s + high))
         one = _straight(points[i:j, 0] - s, points[i:j, 1:], curvature)
-        if one is not None and (best is None or one[2] < best[2]):
-            best = one
-    return None if best is None else (s, *best)
+        fits += [one] if one is not None else []
+    if not fits:
+        return None
+    least = STEADY * min(scatter for *_, scatter in fits)
+    return (s, *next(one for *one, scatter in fits if scatter <= least))
 
 
-def _straight(ahead: np.ndarray, vw: np.ndarray, curvature: float) -> tuple[float, float, float] | None:
-    """Fit a straight piece; returns v and w at its origin, and the standard error."""
+def _straight(ahead: np.ndarray, vw: np.ndarray, curvature: float) -> tuple[float, float, float, float] | None:
+    """Fit a straight piece; returns v and w at its origin, their standard error, and the scatter of the points."""
     values = vw + np.column_stack([0.5 * curvature * ahead**2, np.zeros(len(ahead))])
     kept = np.ones(len(ahead), dtype=bool)
     for _ in range(3):
@@ -217,7 +222,8 @@ def _straight(ahead: np.ndarray, vw: np.ndarray, curvature: float) -> tuple[floa
         scatter = np.sqrt(np.mean(off[kept] ** 2, axis=0))
         kept = (off <= ACCEPTED_SIGMAS * np.maximum(scatter, 0.003)).all(axis=1)
     spread = np.linalg.inv(design.T @ design)[0, 0]
-    return float(fit[0, 0]), float(fit[0, 1]), float(np.hypot(*scatter) * np.sqrt(spread))
+    both = float(np.hypot(*scatter))
+    return float(fit[0, 0]), float(fit[0, 1]), both * float(np.sqrt(spread)), both
 
 
 def wires_of(course: int, nodes: Nodes) -> Iterator[Wire]:

@@ -1,0 +1,445 @@
+"""Measure Clearance: sweeps a structure gauge along tracks through the raw cloud, and measures platforms and wires."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from ..clearance.profiles import COLUMNS, CUSTOM, NO_RULE, Profile, custom, named
+from ..errors import CrsError, ParameterError, RailExtractError
+from ..fields import INTRUSION_FIELDS, LENGTH
+from ..progress import Recording
+from . import outputs, shared
+from .declaration import (
+    CLOUD_NEEDS,
+    CLOUD_WORDS,
+    LINE,
+    POINT,
+    POLYGON,
+    RAIL_WORDS,
+    TABLE,
+    TRACK_WORDS,
+    Choice,
+    Figure,
+    Job,
+    LayerInput,
+    LayerOutput,
+    Number,
+    Text,
+)
+from .values import class_numbers
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import numpy as np
+
+    from ..clearance.frame import Course
+    from ..clearance.measure import Clearance, Settings
+    from ..clouds.points import Request
+    from ..kilometres.axes import PlacedAxes
+    from ..progress import Progress
+    from .lines import Lines
+    from .result import Result
+    from .values import Values
+
+DEFAULT_PROFILE, WIDENINGS, TRAINS = "EBO_G1", ("NONE", "EBO"), ("MARK", "LEAVE_OUT")
+DEFAULT_FLOOR_MM = 80.0
+"""Heads, check rails and level crossings are lower: 80 mm over the rail tops the space for vehicles begins (EBO)."""
+
+MAX_MARGIN_MM, FLOOR_MM, MAX_DISTANCE_M = 2000.0, (-200.0, 1000.0), 100.0
+"""Values beyond are in another unit."""
+
+READING = 0.05
+"""Fraction of the progress bar at which the lines are read."""
+
+HEIGHTS_OFF_M = 20.0
+"""A cloud whose middle is so far above or below the tracks has other heights: within ten metres of a track, its points
+are on the ground or on what stands there."""
+
+
+def _check(values: Values) -> None:
+    """Check the profile, the classes, the lines and the axis."""
+    profile = _profile(values)
+    if values["WIDENING"] == "EBO" and profile.rule == NO_RULE:
+        raise ParameterError(f"PROFILE {profile.name} has no rule for curves: leave WIDENING at NONE, or use MARGIN.")
+    _left_out(values)
+    for name in ("INPUT", "RAILS"):
+        if values.filled(name):
+            values.source(name)
+    if values.has_axis():
+        values.axes(values.cloud_crs("POINTS"))
+
+
+def _profile(values: Values) -> Profile:
+    """Return the profile, which PROFILE_FILE states if PROFILE is CUSTOM."""
+    if values["PROFILE"] != CUSTOM:
+        return named()[values["PROFILE"]]
+    if not values.filled("PROFILE_FILE"):
+        raise ParameterError(
+            f"PROFILE is CUSTOM: name a file with the columns {' and '.join(COLUMNS)} in PROFILE_FILE."
+        )
+    return values.once("profile", lambda: _custom(values))
+
+
+def _custom(values: Values) -> Profile:
+    """Read the user's profile: a table, or a layer with a line or a polygon."""
+    source = values.source("PROFILE_FILE")
+    title = values.title("PROFILE_FILE")
+    name = title.replace("\\", "/").rpartition("/")[2] or "PROFILE_FILE"
+    if all(column in source.fields for column in COLUMNS):
+        try:
+            points = [(float(row[COLUMNS[0]]), float(row[COLUMNS[1]])) for _, row in source.rows()]
+        except (TypeError, ValueError) as error:
+            raise ParameterError(f"PROFILE_FILE {name} has a row without two numbers: correct or delete it.") from error
+        return custom(points, name)
+    drawn = [part for one in source.features(None) for kind, part in one.parts if kind in (LINE, POLYGON)]
+    if len(drawn) != 1:
+        raise ParameterError(
+            f"PROFILE_FILE {name} has neither the columns {' and '.join(COLUMNS)} nor one line or polygon: give one."
+        )
+    return custom([(float(v), float(w)) for v, w in drawn[0][:, :2]], name)
+
+
+def _left_out(values: Values) -> tuple[int, ...]:
+    """Return the classes that count nowhere."""
+    text = (values["CLASSES_OUT"] or "").strip()
+    return class_numbers(text, "CLASSES_OUT") if text else ()
+
+
+def _run(values: Values, progress: Progress) -> Result:
+    """Measure the clearance."""
+    from ..clearance.measure import measure
+    from ..clearance.sweep import EVERY_CLASS
+
+    progress = Recording(progress)
+    profile, request = _profile(values), values.request(EVERY_CLASS, progress, name="POINTS")
+    if profile.said:
+        progress.warning(profile.said)
+    if values.filled("PROFILE_FILE") and values["PROFILE"] != CUSTOM:
+        progress.warning(f"PROFILE_FILE is not used: PROFILE is {profile.name}. Choose CUSTOM for your own profile.")
+    courses = _courses(values, request, progress.span(0.0, READING))
+    settings = _settings(values, profile)
+    with values.scratch() as folder, values.runner() as runner:
+        found = measure(request, courses, settings, folder / "points", runner, progress.span(READING, 1.0))
+    _check_cloud(found, progress)
+    axes = values.axes(values.cloud_crs("POINTS")) if values.has_axis() else None
+    if axes is not None:
+        found = _placed(found, axes, progress)
+    for sentence in _said(found):
+        progress.warning(sentence)
+    return _result(replace(found, warnings=progress.warnings), axes, values)
+
+
+def _settings(values: Values, profile: Profile) -> Settings:
+    """Return what is measured."""
+    from ..clearance.measure import Settings
+
+    return Settings(
+        profile,
+        values["MARGIN"] / 1000,
+        values["FLOOR"] / 1000,
+        values["STEP"],
+        values["WIDENING"],
+        values["DISTANCE"],
+        _left_out(values),
+        values["TRAINS"],
+    )
+
+
+def _courses(values: Values, request: Request, progress: Progress) -> tuple[Course, ...]:
+    """Return the tracks with the cant of their rails, in metres from the zero of the cloud's coordinate system.
+
+    Raises
+    ------
+    RailExtractError
+        They have no heights, are in heights of another unit, or the rails are of another run.
+    """
+    import numpy as np
+
+    from ..clearance.frame import MIN_LENGTH_M, course_of
+
+    lines = _lines(values, "INPUT", request, progress)
+    shift = lines.frame.shift_to(request.zero)
+    tracks = [replace(one, xyz=one.xyz + shift) for one in lines.centerlines()]
+    flat = [one.track_id for one in tracks if not np.isfinite(one.xyz).all()]
+    if flat:
+        raise RailExtractError(f"Track {flat[0]} of INPUT has no heights: take the centerlines from Extract Rails.")
+    rails = []
+    if values.filled("RAILS"):
+        read = _lines(values, "RAILS", request, progress)
+        rails = [replace(one, xyz=one.xyz + read.frame.shift_to(request.zero)) for one in read.rails(progress)]
+    rails = [one for one in rails if np.isfinite(one.xyz).all()]
+    long = [one for one in tracks if one.line.length_m >= MIN_LENGTH_M]
+    if not long:
+        raise RailExtractError(f"No line of INPUT is {MIN_LENGTH_M:g} m long or longer: give centerlines of tracks.")
+    known = {one.rail_id: one for one in rails}
+    made, lacking = [], []
+    for track in long:
+        ids = (*track.left_ids, *track.right_ids)
+        own = [known[number] for number in ids if number in known]
+        if values.filled("RAILS") and len(own) < len(ids):
+            lacking.append(track.track_id)
+        course = course_of(track, own)
+        _check_rails(course, own)
+        made.append(course)
+    _say_cant(made, lacking, values.filled("RAILS"), progress)
+    return tuple(made)
+
+
+def _lines(values: Values, name: str, request: Request, progress: Progress) -> Lines:
+    """Read lines in the coordinate system of the cloud."""
+    from ..clouds.crs import parse_crs, units
+    from .features import read_lines_in
+
+    source, wkt = values.source(name), request.zero.crs_wkt
+    if source.crs_wkt and wkt and units(parse_crs(source.crs_wkt))[1] != request.zero.vertical_unit_m:
+        raise CrsError(f"{name} has heights in another unit than POINTS: give both in the same vertical unit.")
+    return read_lines_in(source, wkt, progress)
+
+
+def _check_rails(course: Course, rails: Sequence[Any]) -> None:
+    """Refuse rails that are not beside their centerline."""
+    import numpy as np
+
+    from ..clearance.frame import SAME_PLACE_M, rail_offsets
+
+    left, right = rail_offsets(course, rails) if rails else (np.nan, np.nan)
+    if abs(left - right) > SAME_PLACE_M or (rails and not (np.isfinite(left) and np.isfinite(right))):
+        raise RailExtractError(
+            f"RAILS are {left:.2f} and {right:.2f} m beside track {course.track_id} of INPUT: give the rails of the "
+            "same run."
+        )
+
+
+def _say_cant(courses: Sequence[Course], lacking: Sequence[int], has_rails: bool, progress: Progress) -> None:
+    """Say where the cant is unknown."""
+    without = [str(one.track_id) for one in courses if not one.has_cant]
+    if without and not has_rails:
+        progress.warning("Without RAILS the cant is unknown: what is beside canted track is not judged surely.")
+    elif without:
+        progress.warning(
+            f"Tracks {', '.join(without)} of INPUT state no rails in left_ids and right_ids that RAILS has: their cant "
+            "is unknown."
+        )
+    if lacking:
+        progress.warning(f"RAILS lacks rails of tracks {', '.join(map(str, lacking))}: give all rails of the run.")
+
+
+def _check_cloud(found: Clearance, progress: Progress) -> None:
+    """Refuse a cloud of another place or with other heights, and say what is odd about its classes."""
+    import numpy as np
+
+    swept = found.swept
+    if not swept.nearby:
+        raise RailExtractError("POINTS has no point within 10 m of a track: check the coordinate systems.")
+    if abs(swept.above_m) > HEIGHTS_OFF_M:
+        where = "above" if swept.above_m > 0 else "below"
+        raise RailExtractError(
+            f"The cloud lies {abs(swept.above_m):.0f} m {where} the tracks: are these ellipsoidal against levelled "
+            "heights? Give both in the same heights."
+        )
+    used = np.flatnonzero(swept.census)
+    if len(used) == 1 and used[0] not in (0, 1):
+        progress.warning(f"Every point is of class {used[0]}: take the raw cloud, which shows what is beside the rails.")
+    unused = [str(code) for code in found.settings.left_out if not swept.census[code]]
+    if unused:
+        progress.warning(f"The cloud has no points of class {', '.join(unused)}, which CLASSES_OUT names.")
+
+
+def _placed(found: Clearance, axes: PlacedAxes, progress: Progress) -> Clearance:
+    """Return what was found with its kilometres."""
+    import numpy as np
+
+    def at(xyz: np.ndarray) -> np.ndarray:
+        return found.frame.to_crs(xyz)[:, :2]
+
+    xyz = [one.xyz for one in found.intrusions]
+    km = axes.kilometres(at(np.reshape(xyz, (-1, 3))), progress)
+    intrusions = [
+        replace(one, km=float(km.km[number]), km_text=km.km_text[number]) for number, one in enumerate(found.intrusions)
+    ]
+    stations = [replace(one, kilometres=axes.locate(at(one.xyz), progress)) for one in found.stations]
+    by_number = {one.intrusion: one for one in intrusions}
+    sections = tuple(replace(one, intrusion=by_number[one.intrusion.intrusion]) for one in found.sections)
+    return replace(found, intrusions=tuple(intrusions), stations=tuple(stations), sections=sections)
+
+
+def _said(found: Clearance) -> list[str]:
+    """Return what the user is told about the result."""
+    from ..clearance.remarks import remarks
+
+    return remarks(found)
+
+
+def _result(found: Clearance, axes: PlacedAxes | None, values: Values) -> Result:
+    """Return the result."""
+    import numpy as np
+
+    from ..files.clearance import clearance_makers
+    from ..report.clearance import clearance_page, summary
+    from .result import Result, ShownCloud
+
+    least_m = found.least_margin_m
+    figures = {
+        "INTRUSION_COUNT": len(found.sure),
+        "LEAST_MARGIN": round(1000 * least_m, 1) + 0.0 if np.isfinite(least_m) else None,
+        "PLATFORM_COUNT": len(found.platforms),
+        "WIRE_LENGTH": LENGTH.value(sum(one.length_m for one in found.wires)),
+        "POINT_COUNT": found.point_count,
+    }
+    source = values.cloud("POINTS").paths[0].resolve().name
+    return Result(
+        figures,
+        found.frame,
+        clearance_makers(found, axes),
+        {"REPORT": lambda: clearance_page(found, source, {"Command": values.command})},
+        tuple(summary(found)),
+        ShownCloud("POINTS", tuple(range(256)), 0.07),
+        found=found,
+    )
+
+
+JOB = Job(
+    "measureclearance",
+    "Measure clearance",
+    "Sweeps a structure gauge along tracks through the cloud: what stands inside, by how much, where, and how surely.",
+    "Takes the lines of Extract Rails and the raw cloud. Each object inside the profile becomes one point with its "
+    "depth, standard error, place, height and class. Stations state the margins left and right, the distance of the "
+    "neighbour tracks, platform edges and the contact wire.\n\n"
+    "Profiles are swept in the plane of both rail tops, so that cant and curves count; give Rails for the cant. Only "
+    "profiles with a public source ship by name. Others are read from a file: EN 15273 and company rules are sold, or "
+    "forbid copies.\n\n"
+    "This is a screening and no proof of conformity: steps between the strips of a survey, often 5 to 20 mm, are not in "
+    "the standard errors.",
+    (
+        *(*RAIL_WORDS, *CLOUD_WORDS, *TRACK_WORDS, "clearance", "structure gauge", "loading gauge", "profile"),
+        *("platform", "contact wire", "catenary", "tunnel", "Lichtraum", "Lichtraumprofil", "gabarit", "gálibo"),
+    ),
+    CLOUD_NEEDS,
+    (
+        LayerInput(
+            "INPUT",
+            "Track centerlines",
+            "3D lines of Extract Rails or Build Track Centerlines, with track_id, left_ids and right_ids.",
+            transformed=True,
+        ),
+        replace(
+            shared.CLOUD,
+            name="POINTS",
+            help=f"The raw cloud: every class is read, withheld points are not. {shared.CLOUD.help}",
+        ),
+        LayerInput(
+            "RAILS",
+            "Rails",
+            "3D lines of the rails of the same run, which give the cant. Without them, what stands beside canted track "
+            "is not judged surely.",
+            optional=True,
+            transformed=True,
+        ),
+        Choice(
+            "PROFILE",
+            "Profile",
+            "Outline that is swept along the tracks. CUSTOM takes it from PROFILE_FILE.",
+            options=(*named(), CUSTOM),
+            default=DEFAULT_PROFILE,
+        ),
+        LayerInput(
+            "PROFILE_FILE",
+            "Profile from a file",
+            f"CSV file with the columns {' and '.join(COLUMNS)}, or a layer with one line or polygon, x being v and y "
+            "being w, in metres: to the left of the middle of the track, and above the rail tops. With v >= 0 only, a "
+            "half from its foot to its top.",
+            optional=True,
+            transformed=True,
+            kinds=(TABLE,),
+        ),
+        Number(
+            "MARGIN",
+            "Margin [mm]",
+            "The profile grows by this all round, but not downwards.",
+            default=0.0,
+            high=MAX_MARGIN_MM,
+        ),
+        Choice(
+            "WIDENING",
+            "Widening in curves",
+            "EBO widens the profile by the measured curvature and gauge, as the German regulations ask.",
+            options=WIDENINGS,
+            default=WIDENINGS[0],
+        ),
+        Number(
+            "FLOOR",
+            "Lowest height [mm]",
+            "Points lower over the rail tops are no intrusions: rails, bed, level crossings.",
+            advanced=True,
+            default=DEFAULT_FLOOR_MM,
+            low=FLOOR_MM[0],
+            high=FLOOR_MM[1],
+        ),
+        Text(
+            "CLASSES_OUT",
+            "Classes to leave out",
+            "Classes that count nowhere, such as 3,4,5 for vegetation.",
+            advanced=True,
+            optional=True,
+        ),
+        Choice(
+            "TRAINS",
+            "Vehicles on tracks",
+            "MARK names trains that stand on tracks and does not count them; LEAVE_OUT omits them.",
+            advanced=True,
+            options=TRAINS,
+            default=TRAINS[0],
+        ),
+        Number(
+            "DISTANCE",
+            "Least distance between tracks [m]",
+            "Tracks nearer to each other are listed. Empty: 4.00 m for EBO profiles, else nothing is judged.",
+            advanced=True,
+            optional=True,
+            high=MAX_DISTANCE_M,
+        ),
+        replace(
+            shared.STEP,
+            label="Step of the stations [m]",
+            help="Distance between the stations along each track at which margins are given.",
+            high=100.0,
+        ),
+        *shared.AREA,
+        shared.WORKERS,
+        *shared.axis(optional=True),
+    ),
+    (
+        LayerOutput(
+            "INTRUSIONS",
+            "Intrusions",
+            "A point for each object inside the profile, at its worst place, the deepest sure one first.",
+            kind=POINT,
+        ),
+        LayerOutput(
+            "OUTPUT",
+            "Clearance",
+            "Points along each track with margins, distances of what stands beside, neighbour tracks, platforms, wire.",
+            optional=True,
+            kind=POINT,
+        ),
+        LayerOutput("PLATFORMS", "Platforms", "Lines along platform edges, with offset and height.", optional=True),
+        LayerOutput("WIRES", "Contact wires", "Lines along contact wires, with height and stagger.", optional=True),
+        replace(outputs.REPORT, help="A web page with a verdict, diagrams, the worst cross-sections and tables."),
+    ),
+    (
+        Figure("INTRUSION_COUNT", "Number of objects surely inside"),
+        Figure("LEAST_MARGIN", "Least margin, negative inside [mm]"),
+        Figure("PLATFORM_COUNT", "Number of platform edges"),
+        Figure("WIRE_LENGTH", "Length of the contact wires [m]"),
+        Figure("POINT_COUNT", "Points within reach"),
+    ),
+    fields=INTRUSION_FIELDS,
+    picture="gauge.svg",
+    guide="clearance",
+    pages=("clearance", "reference"),
+    call="clearance",
+    check=_check,
+    run=_run,
+)
