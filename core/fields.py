@@ -306,7 +306,13 @@ INTRUSION_FIELDS = (
     Field("km_text", str, "the kilometre as railways write it"),
     Field("review", str, "decision of the user: accepted or rejected; empty before"),
 )
-BAND_NAMES = ("from the lowest height to 380 mm", "380 to 1170 mm", "1170 to 3250 mm", "3250 to 4310 mm", "4310 to 7000 mm")
+BAND_NAMES = (
+    "from the lowest height to 380 mm",
+    "380 to 1170 mm",
+    "1170 to 3250 mm",
+    "3250 to 4310 mm",
+    "4310 to 7000 mm",
+)
 """Height bands of the stations of the clearance, over the rail tops."""
 
 SIDES = (("l", "left"), ("r", "right"))
@@ -316,7 +322,10 @@ CLEARANCE_FIELDS = (
     Field("cant_mm", float, "cant used: left rail minus right rail, millimetres", 1),
     Field("radius_m", float, "radius over 15 m, positive in left-hand curves, empty above 10 km, metres", 1),
     *(Field(f"wide_{one}_mm", float, f"widening used on the {side}, millimetres", 1) for one, side in SIDES),
-    *(Field(f"{one}mar_mm", float, f"least margin on the {side}, millimetres; negative inside", 1) for one, side in SIDES),
+    *(
+        Field(f"{one}mar_mm", float, f"least margin on the {side}, millimetres; negative inside", 1)
+        for one, side in SIDES
+    ),
     *(
         Field(f"{one}{band}_mm", float, f"{side}: distance of the third nearest point, {name}, millimetres", 1)
         for one, side in SIDES
@@ -358,7 +367,9 @@ PLATFORM_FIELDS = (
     Field("from_m", float, "chainage at which the edge begins, metres", 1),
     Field("to_m", float, "chainage at which it ends, metres", 1),
     Field("length_m", float, "length along the track, metres", 1),
-    Field("offset_mm", float, "mean distance from the middle of the track in the plane of the rail tops, millimetres", 1),
+    Field(
+        "offset_mm", float, "mean distance from the middle of the track in the plane of the rail tops, millimetres", 1
+    ),
     Field("offmin_mm", float, "least distance, millimetres", 1),
     Field("offmax_mm", float, "largest distance, millimetres", 1),
     Field("height_mm", float, "mean height over the plane of the rail tops, millimetres", 1),

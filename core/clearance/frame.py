@@ -1,4 +1,4 @@
-"""The frame of a track: along the centerline, across it in the plane of both rail tops, and perpendicular to that plane.
+"""The frame of a track: along the centerline, across it in the plane of both rail tops, and perpendicular to it.
 
 s is the plan distance along the centerline, v the distance to the left in the plane of the rail tops, and w the height
 above this plane, from the middle between both tops. See docs/clearance.md.
@@ -33,8 +33,8 @@ HALF_SPACING_M = 0.75
 """Distance of a rail's middle from the centerline where the gauge is not stated: that of standard gauge."""
 
 RAIL_REACH_M = 0.35
-"""A rail is looked for so far from its expected place: less than half of the narrowest spacing, so that the rail of
-another branch is none."""
+"""A rail is looked for within this distance of its expected place: less than half of the narrowest spacing, so that the
+rail of another branch is none."""
 
 SAME_PLACE_M = 0.10
 """Largest difference between the distances of both rails from the centerline of their own track."""
@@ -80,7 +80,7 @@ class Course:
     gauge_m : float
         Measured gauge, NaN if unknown.
     sigma_m, cant_sigma_m : float
-        Standard errors of the line across and of the cant; the latter holds all of the cant where it is unknown.
+        Standard errors of the line across and of the cant; where the cant is unknown, that of the cant holds all of it.
     noise_m : float
         Noise of a point.
     has_cant : bool
@@ -201,7 +201,9 @@ def course_of(line: Centerline, rails: Sequence[RailLine]) -> Course:
         bridged=bridged,
         gauge_m=line.gauge_mm / 1000,
         sigma_m=_mean_error([rail.sigma_mm for rail in rails], LINE_SIGMA_M, 0.5**0.5),
-        cant_sigma_m=np.hypot(0.0 if has_cant else doubt_m, _mean_error([r.sigmaz_mm for r in rails], CANT_SIGMA_M, 2**0.5)),
+        cant_sigma_m=np.hypot(
+            0.0 if has_cant else doubt_m, _mean_error([r.sigmaz_mm for r in rails], CANT_SIGMA_M, 2**0.5)
+        ),
         noise_m=max(_mean_error([rail.resid_mm for rail in rails], USUAL_NOISE_M), LEAST_NOISE_M),
         has_cant=has_cant,
     )

@@ -23,7 +23,7 @@ SAME_SIGMAS = 2.0
 """Places whose depths differ by fewer standard errors are one surface."""
 
 SURE_SIGMAS = 2.0
-"""An object is inside for sure if its depth exceeds so many standard errors."""
+"""An object is inside for sure if its depth exceeds this number of standard errors."""
 
 FIT_FACTOR = 1.25
 """What the standard error of a fit is multiplied by: points of one surface share what the fit does not know, such as

@@ -165,7 +165,12 @@ class Clearance:
 
 
 def measure(
-    request: Request, courses: Sequence[Course], settings: Settings, folder: Path, runner: Runner, progress: Progress = SILENT
+    request: Request,
+    courses: Sequence[Course],
+    settings: Settings,
+    folder: Path,
+    runner: Runner,
+    progress: Progress = SILENT,
 ) -> Clearance:
     """Measure the clearance along tracks.
 
@@ -286,7 +291,9 @@ def _cross_section(
     course = courses[one.course]
     low, high = _stations_of(course, section)
     part = course.part(low, high)
-    points = read_points(part, section, _files(swept, one.course, section), _rules(part, wide[one.course][low:high], settings))
+    points = read_points(
+        part, section, _files(swept, one.course, section), _rules(part, wide[one.course][low:high], settings)
+    )
     near = np.flatnonzero(np.abs(points.s - one.chainage_m) <= SLICE_M)
     near = near[:: max(len(near) // MOST_DRAWN, 1)]
     sides = wide[one.course][course.station(np.array([one.chainage_m]))][0]

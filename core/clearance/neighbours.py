@@ -12,13 +12,16 @@ from ..polyline import runs
 from .frame import STEP_M, Course
 
 REACH_M = 8.0
-"""Tracks further apart are no neighbours: between them is room for another one."""
+"""Between tracks further apart there is room for another one."""
 
 PARALLEL_DEG = 20.0
 """Largest angle between neighbour tracks: others cross."""
 
 JOINED_M, APART_M = 2.5, 3.5
 """Tracks nearer than the first join in a switch; nothing is judged from there to where the second is reached."""
+
+ERROR_M = 0.002
+"""Error of a distance between two measured lines: tracks that are built at the least distance are not too near."""
 
 EBO_DISTANCE_M = 4.0
 """Least distance of tracks on the open line (EBO section 10)."""
@@ -65,7 +68,7 @@ class Side:
     @property
     def short(self) -> np.ndarray:
         """Which stations, (n,), are nearer to the neighbour than required."""
-        return self.judged & (self.distance_m < self.least_m)
+        return self.judged & (self.distance_m < self.least_m - ERROR_M)
 
 
 def neighbours(courses: Sequence[Course], number: int, least_m: float, is_of_ebo: bool) -> tuple[Side, Side]:

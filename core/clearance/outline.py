@@ -26,8 +26,8 @@ SAME_M = 1e-9
 class Outline:
     """The boundary of a profile above the lowest height that counts.
 
-    Edges that lie wholly below `floor_m`, and the closing edge at the foot, are no boundary: nothing rises from the
-    bed through them.
+    Edges that lie wholly below `floor_m`, and the closing edge at the foot, do not count: nothing rises from the bed
+    through them.
     """
 
     def __init__(self, profile: Profile, floor_m: float) -> None:
@@ -42,7 +42,7 @@ class Outline:
         self._low, self._high = ring.min(axis=0) - ROOM_M, ring.max(axis=0) + ROOM_M
 
     def distance(self, vw: np.ndarray) -> np.ndarray:
-        """Return the distance of points, (n, 2), to the outline, (n,) metres, positive inside; exact above -`NEAR_M`."""
+        """Return the distance of points, (n, 2), to the outline, (n,), positive inside; exact above -`NEAR_M`."""
         found = self._from_table(vw)
         near = found > -NEAR_M - CELL_M
         found[near] = self.exact(vw[near])

@@ -19,10 +19,11 @@ OTHER, PLATFORM, WIRE = range(3)
 """What a point is of; parts are of one kind."""
 
 AROUND_M = 0.20
-"""Points so far outside of the profile count for the surface of an object, so that its mean is not cut off at zero."""
+"""Points up to this distance outside of the profile count for the surface of an object, so that its mean is not cut off
+at zero."""
 
 TOGETHER, TOGETHER_M = 4, 0.10
-"""So many points within such a distance make a thing: dust, birds and rain are single points."""
+"""This number of points within a distance makes a thing: dust, birds and rain are single points."""
 
 CELL_M = 0.2
 """Cells of points inside that touch, with at most one cell between, are one object."""
@@ -31,8 +32,8 @@ WINDOW_M = 0.5
 """Side of the pieces of an object, along the track and in height, each of which gets a surface."""
 
 HOPELESS_SIGMAS = 8.0
-"""A piece whose third deepest point is so many standard deviations of the noise less deep than that of the deepest
-piece is not the deepest one."""
+"""A piece whose third deepest point is this number of standard deviations of the noise less deep than that of the
+deepest piece is not the deepest one."""
 
 SEAM_M = 3 * CELL_M
 """Length on both sides of the border of two sections in which both name the cells of their parts."""
@@ -159,9 +160,7 @@ def _part(
     )
 
 
-def _surfaces(
-    near: Inside, own: np.ndarray, noise_m: float, outline: Outline, depth_at: Depth
-) -> Iterator[Surface]:
+def _surfaces(near: Inside, own: np.ndarray, noise_m: float, outline: Outline, depth_at: Depth) -> Iterator[Surface]:
     """Yield the surfaces of the pieces of a part that may be its deepest."""
     window = np.floor(near.place[own][:, [0, 2]] / WINDOW_M).astype(np.int64)
     order = np.lexsort((-near.depth[own], window[:, 1], window[:, 0]))

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import median_filter
 
-
 ASIDE_M, HEIGHT_M = (1.2, 3.0), (0.12, 1.4)
 """Where edges of platforms are, aside and above the rail tops."""
 
@@ -16,7 +15,7 @@ LAYER_M = 0.04
 """Thickness of the layers among which the level face is: paving is even within it."""
 
 FULLEST, LEAST_POINTS, LEAST_WIDTH_M = 3, 30, 0.3
-"""The level face is the highest of so many fullest layers that has so many points over such a width."""
+"""The level face is the highest of this number of fullest layers that has enough points over such a width."""
 
 ROUNDS, LEVEL_SIGMA_M, STEEPEST = 4, 0.012, 0.10
 """Rounds of the fit of the level face, distance up to which points count, and steepest fall of a platform across."""
@@ -38,13 +37,13 @@ LONGEST_HOLE_M, LARGEST_STEP_M, SHORTEST_M = 3.0, 0.10, 10.0
 """Between metres of one platform: longest hole and largest step; and the shortest platform."""
 
 STRAY_M, MEDIAN_OF = 0.03, 5
-"""What deviates so far from the median of so many metres is no edge."""
+"""What deviates by this from the median of a number of metres is not an edge."""
 
 NOMINAL_MM, NOMINAL_WITHIN_MM = (550, 760), 60.0
 """Heights of the technical specification for interoperability, and how near a platform is to be one."""
 
 LEVEL, EDGE = 0.05, 0.10
-"""Points at most so far above the level, and so far in front of the edge, are of the platform."""
+"""Points at most at these distances above the level and in front of the edge are of the platform."""
 
 
 @dataclass(frozen=True)
@@ -150,7 +149,7 @@ def _level(aside: np.ndarray, w: np.ndarray) -> tuple[float, float, np.ndarray] 
 def _first_of_level(aside: np.ndarray) -> tuple[float, float]:
     """Return where a level face begins that is seen from above only, and the standard error of that.
 
-    Its points are as dense everywhere, so that those beyond the noise of the first one tell how wide the face is there.
+    Its points are evenly dense: those beyond the noise of the first one show the width of the face there.
     """
     inner = float(aside.min()) + EDGE_NOISE_M
     density = max(int(((aside >= inner) & (aside < inner + EVEN_M)).sum()), 1) / EVEN_M
@@ -175,7 +174,8 @@ def _runs(course: int, side: int, edges: Sequence[Edge]) -> Iterator[Platform]:
     for part in np.split(rows, breaks):
         if len(part) and part[-1, 0] - part[0, 0] + 1.0 >= SHORTEST_M:
             sigma, sigmaz = np.sqrt(np.mean(part[:, 3:] ** 2, axis=0))
-            yield Platform(course, side, *part[:, :3].T, float(sigma), float(sigmaz))
+            s, offset, height = part[:, :3].T
+            yield Platform(course, side, s, offset, height, float(sigma), float(sigmaz))
 
 
 def on_platforms(platforms: Sequence[Platform], s: np.ndarray, v: np.ndarray, w: np.ndarray) -> np.ndarray:
@@ -188,3 +188,12 @@ def on_platforms(platforms: Sequence[Platform], s: np.ndarray, v: np.ndarray, w:
     return found
 
 
+def edge_at(platforms: Sequence[Platform], course: int, side: int, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return offset and height of the platform edge on a side of a track at chainages, (n,) each, NaN without one."""
+    offset, height = np.full((2, len(s)), np.nan)
+    for one in platforms:
+        if (one.course, one.side) == (course, side):
+            at = one.near(s)
+            offset = np.where(at >= 0, one.offset_m[at], offset)
+            height = np.where(at >= 0, one.height_m[at], height)
+    return offset, height

@@ -27,7 +27,7 @@ COLUMNS = ("v_m", "w_m")
 """Columns of the user's file: metres to the left of the middle of the track, and above the tops of the rails."""
 
 MAX_M = 20.0
-"""Larger coordinates are no metres: the widest gauge in use is 6 m high."""
+"""Larger coordinates are not in metres: the widest gauge in use is 6 m high."""
 
 LEAST_POINTS = 3
 """Fewer points make no outline."""
@@ -126,7 +126,9 @@ def custom(points: Sequence[tuple[float, float]], name: str) -> Profile:
     said = None
     if all(v >= 0 for v, _ in ring):
         if ring[-1][0] > 0:
-            said = f"The half outline of {name} does not end at v = 0: it was closed at its top, {ring[-1][1]:g} m high."
+            said = (
+                f"The half outline of {name} does not end at v = 0: it was closed at its top, {ring[-1][1]:g} m high."
+            )
             ring.append((0.0, ring[-1][1]))
         ring = list(mirrored(ring))
     if _crosses_itself(ring):
@@ -138,9 +140,7 @@ def _crosses_itself(ring: Sequence[tuple[float, float]]) -> bool:
     """Return whether two edges of a ring that are not neighbours meet; outlines have few edges."""
     edges = list(zip(ring, [*ring[1:], ring[0]]))
     last = len(edges) - 1
-    return any(
-        _meet(*edges[i], *edges[j]) for i in range(last) for j in range(i + 2, last + 1) if (i, j) != (0, last)
-    )
+    return any(_meet(*edges[i], *edges[j]) for i in range(last) for j in range(i + 2, last + 1) if (i, j) != (0, last))
 
 
 def _meet(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float], d: tuple[float, float]) -> bool:

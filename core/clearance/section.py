@@ -98,7 +98,9 @@ class Least:
     def joined(cls, parts: Sequence[Least]) -> Least:
         """Return the least values of several parts."""
         cell = np.repeat(np.concatenate([one.cell for one in parts]), THIRD)
-        aside, margin = (np.concatenate([getattr(one, name).ravel() for one in parts]) for name in ("aside_m", "margin_m"))
+        aside, margin = (
+            np.concatenate([getattr(one, name).ravel() for one in parts]) for name in ("aside_m", "margin_m")
+        )
         return cls(np.unique(cell), _three(cell, aside), _three(cell, margin))
 
 
@@ -159,7 +161,9 @@ def _near(points: Points, kind: np.ndarray, nodes: Nodes) -> Inside:
     near = np.flatnonzero(points.depth > -AROUND_M)
     s, v, w = points.s[near], points.v[near], points.w[near]
     away = nodes.away(s, v, w) - LIVE_M
-    return Inside(np.column_stack([s, v, w]), points.depth[near], points.code[near], kind[near], points.is_own[near], away)
+    return Inside(
+        np.column_stack([s, v, w]), points.depth[near], points.code[near], kind[near], points.is_own[near], away
+    )
 
 
 def read_points(course: Course, section: int, files: Sequence[Sequence[str]], rules: Rules) -> Points:

@@ -1,4 +1,4 @@
-"""How deep the surface of an object is inside a profile: a fit to its points, because the deepest of many points is noise.
+"""How deep the surface of an object is inside a profile: a fit to its points, as the deepest one is noise.
 
 Of N points of a plane, the deepest lies two to three standard deviations of the noise too deep. See docs/clearance.md.
 """
@@ -15,7 +15,7 @@ ALONG_M, UP_M, ACROSS_M = 0.15, 0.35, 0.13
 cylinder there, and large enough for some dozens of points at 400 per square metre."""
 
 DEEPEST = 6
-"""The median of so many points leads to the deepest part: a single one is noise."""
+"""The median of this number of points leads to the deepest part: a single one is noise."""
 
 LEAST_POINTS = 8
 """Fewer points make no surface: four unknowns leave too little to judge them by."""
@@ -27,13 +27,14 @@ BELOW_WEIGHT = 0.08
 """Weight of points below the envelope: those of what stands behind."""
 
 NEAR_SIGMAS, STRAY_SIGMAS = 3.0, 4.0
-"""Points within so many standard deviations of the noise are of the surface; points further above deny it."""
+"""Points within the first number of standard deviations of the noise are of the surface; points further above than the
+second deny it."""
 
 STRAY_SHARE, STRAY_LEAST = 0.08, 3
 """Share and number of points above the surface from which the object is a bush and has none."""
 
 DROP_M = 0.014
-"""The last fit holds where the surface is at most so far behind its deepest line: there a parabola follows a pole of
+"""The last fit holds where the surface is at most this far behind its deepest line: there a parabola follows a pole of
 11 cm within a millimetre. Places are chosen along the track, not by the noise of the points."""
 
 SURE_SLOPE = 2.0
@@ -93,17 +94,24 @@ def surface_of(
     if len(depth) < LEAST_POINTS:
         few = deepest[:3]
         middle = place[few].mean(axis=0) if len(few) else np.full(3, np.nan)
-        return Surface(float(depth[few].mean()) if len(few) else -np.inf, noise_m, *middle.tolist(), False)
+        return _at(middle, float(depth[few].mean()) if len(few) else -np.inf, noise_m, False)
     design = np.column_stack([np.ones(len(s)), t, s, s**2])
     chosen = _on_surface(design, h, noise_m)
     if chosen is None:
         third = deepest[2]
-        return Surface(float(depth[third]), 2 * noise_m, *place[third].tolist(), True)
+        return _at(place[third], float(depth[third]), 2 * noise_m, True)
     fitted, sigma = _smoothed(design[chosen], h[chosen], noise_m)
-    places = centre + np.column_stack([s[chosen], np.outer(t[chosen], [inward[1], -inward[0]]) + np.outer(fitted, inward)])
+    places = centre + np.column_stack(
+        [s[chosen], np.outer(t[chosen], [inward[1], -inward[0]]) + np.outer(fitted, inward)]
+    )
     depths = depth_at(places)
     at = int(np.argmax(depths))
-    return Surface(float(depths[at]), float(sigma[at]), *places[at].tolist(), True)
+    return _at(places[at], float(depths[at]), float(sigma[at]), True)
+
+
+def _at(place: np.ndarray, depth_m: float, sigma_m: float, is_sure: bool) -> Surface:
+    s, v, w = place.tolist()
+    return Surface(depth_m, sigma_m, s, v, w, is_sure)
 
 
 def _on_surface(design: np.ndarray, h: np.ndarray, noise_m: float) -> np.ndarray | None:
@@ -125,7 +133,7 @@ def _on_surface(design: np.ndarray, h: np.ndarray, noise_m: float) -> np.ndarray
 
 
 def _smoothed(design: np.ndarray, h: np.ndarray, noise_m: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return the surface at its points, a plane or cylinder whose slopes and bend surely differ from zero, and errors."""
+    """Return the surface at its points, a plane or cylinder whose slopes and bend are sure, and errors."""
     kept = [0, 1, 2, 3]
     while True:
         own = design[:, kept]

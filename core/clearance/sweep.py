@@ -27,7 +27,8 @@ SECTION_M = 100.0
 """Length of a section: with 1,500 points per square metre on all sides, its points take 0.2 GB."""
 
 HALO_M = 30.0
-"""Length beyond the ends of a section that is read with it: a wire is followed and an object joined over so much."""
+"""Length beyond the ends of a section that is read with it: a wire is followed and an object joined over this
+length."""
 
 BESIDE_M = 1.6
 """Points this far beyond the half width of the profile and its margin are kept, so that stations have distances."""
@@ -39,7 +40,8 @@ TOP_M = 7.0
 """Nothing higher is measured: the highest contact wire is 6.5 m high."""
 
 BELOW_M = 0.05
-"""Points so far below the lowest height that counts are kept: the rough height of a point is off by so much."""
+"""Points within this distance below the lowest height that counts are kept: the rough height of a point is off by
+that."""
 
 LOWEST_M = 0.12
 """Platform edges begin here, even where the lowest height that counts is above."""
@@ -195,7 +197,7 @@ def sweep_file(
 
 
 STRIDE = 100
-"""Of so many points near a track, one tells how high the cloud lies."""
+"""One of this number of points near a track shows the height of the cloud."""
 
 
 def _sorted(

@@ -14,7 +14,8 @@ OWN_CELL_M, OWN_LENGTH_M, OWN_SHARE = 0.10, 50.0, 0.5
 scanner."""
 
 OWN_ASIDE_M, OWN_HEIGHT_M = 1.0, (0.3, 4.0)
-"""Where such cells are of the own vehicle: nothing else stands there for so long on a track on which trains run."""
+"""Where such cells are of the own vehicle: nothing else stands there over such a length on a track on which trains
+run."""
 
 BOX_ASIDE_M, BOX_HEIGHT_M = 1.65, (0.3, 4.4)
 """The space of a vehicle on its track."""
@@ -38,7 +39,9 @@ ALL = -1
 """Number that stands for all points that were looked at."""
 
 
-def own_vehicle(s: np.ndarray, v: np.ndarray, w: np.ndarray) -> tuple[np.ndarray, tuple[tuple[float, float, float], ...]]:
+def own_vehicle(
+    s: np.ndarray, v: np.ndarray, w: np.ndarray
+) -> tuple[np.ndarray, tuple[tuple[float, float, float], ...]]:
     """Return which points, (n,), are of the vehicle that carried the scanner, and s, v and w of its cells."""
     may = np.flatnonzero((np.abs(v) < OWN_ASIDE_M) & (w > OWN_HEIGHT_M[0]) & (w < OWN_HEIGHT_M[1]))
     found, cells = np.zeros(len(s), dtype=bool), []

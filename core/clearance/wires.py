@@ -14,8 +14,8 @@ BIN_M = 0.5
 """Length of the pieces in which a wire is looked for: at 400 points per square metre, two or three points of it."""
 
 GROUPS, THICK_M, WIDE_M, LEAST_POINTS = 4, 0.04, 0.06, 2
-"""Groups of points that may be a wire, from below, in each piece: at most so many, so thick and wide, of so many
-points."""
+"""Groups of points that may be a wire, from below, in each piece: their largest number, thickness and width, and least
+number of points."""
 
 BESIDE_M, BESIDE_UP_M = (0.08, 0.40), 0.06
 """Aside and in height: where there are no more points than in a group. A wire is thin: roofs, beams and leaves are
@@ -25,26 +25,27 @@ TRIES = 12
 """Places at which a group is looked for in a piece; a roof has points at every height."""
 
 HEIGHT_COST, POINT_GAIN, POINTS_GAIN, NONE_COST = 0.3, 0.15, 6, 0.8
-"""Cost of a metre of height, gain of a point up to so many of them, and cost of a piece without a wire: the lowest
-thing that goes on is the contact wire, not the messenger, a dropper or an arm."""
+"""Cost of a metre of height, gain of each of the first points, their number, and cost of a piece without a wire: the
+lowest thing that goes on is the contact wire, not the messenger, a dropper or an arm."""
 
 TURN_M, RISE_M, CHANGE_CAP, ENTER_COST = 0.03, 0.02, 12.0, 3.0
 """Change across and in height that costs 1, the largest such cost, and the cost of a gap on either side."""
 
 NEAR_M = 0.05, 0.035
-"""Points so near to the chain, across and in height, are of the wire."""
+"""Points within these distances of the chain, across and in height, are of the wire."""
 
 WINDOWS_M = ((-1.5, 1.5), (-2.2, 0.0), (0.0, 2.2))
 """Parts around a place over which the wire is straight: the steadiest counts, so that a kink at a support stays."""
 
 STEADY = 1.2
-"""The first of these parts counts whose points scatter at most so many times as much as those of the steadiest."""
+"""The first of these parts counts whose points scatter at most this number of times as much as those of the
+steadiest."""
 
 LEAST_FITTED = 6
 """Points that a straight piece needs."""
 
 ACCEPTED_SIGMAS = 3.0
-"""A point so many standard deviations off a straight piece is of an arm or a clamp."""
+"""A point further off a straight piece, in standard deviations, is of an arm or a clamp."""
 
 JUMP_M = 0.10, 0.06
 """Change across and in height between pieces at which a wire breaks: ten times that of the steepest one."""
@@ -117,9 +118,7 @@ class Wire:
         return float(np.abs(ahead - w)[known].max() / GRADE_M * 1000) if known.any() else np.nan
 
 
-def nodes_of(
-    s: np.ndarray, v: np.ndarray, w: np.ndarray, curvature: Callable[[np.ndarray], np.ndarray]
-) -> Nodes:
+def nodes_of(s: np.ndarray, v: np.ndarray, w: np.ndarray, curvature: Callable[[np.ndarray], np.ndarray]) -> Nodes:
     """Return the places of the contact wire in points, (n,) each, over a track whose curvature a function gives."""
     mine = (np.abs(v) < ASIDE_M) & (w > HEIGHT_M[0]) & (w < HEIGHT_M[1])
     s, v, w = s[mine], v[mine], w[mine]
@@ -179,7 +178,10 @@ def _chain(groups: Sequence[np.ndarray]) -> np.ndarray:
         gain = HEIGHT_COST * (own[:, 1] - HEIGHT_M[0]) - POINT_GAIN * np.minimum(own[:, 2], POINTS_GAIN)
         change = np.full((len(before) + 1, len(own) + 1), ENTER_COST)
         change[-1, -1] = 0.0
-        turn = np.abs(before[:, None, 0] - own[None, :, 0]) / TURN_M + np.abs(before[:, None, 1] - own[None, :, 1]) / RISE_M
+        turn = (
+            np.abs(before[:, None, 0] - own[None, :, 0]) / TURN_M
+            + np.abs(before[:, None, 1] - own[None, :, 1]) / RISE_M
+        )
         change[:-1, :-1] = np.minimum(turn, CHANGE_CAP)
         total = costs[:, None] + change
         back.append(np.argmin(total, axis=0))
@@ -206,7 +208,8 @@ def _refined(points: np.ndarray, s: float, curvature: float) -> tuple[float, flo
     if not fits:
         return None
     least = STEADY * min(scatter for *_, scatter in fits)
-    return (s, *next(one for *one, scatter in fits if scatter <= least))
+    v, w, sigma, _ = next(one for one in fits if one[-1] <= least)
+    return s, v, w, sigma
 
 
 def _straight(ahead: np.ndarray, vw: np.ndarray, curvature: float) -> tuple[float, float, float, float] | None:
@@ -240,3 +243,16 @@ def wires_of(course: int, nodes: Nodes) -> Iterator[Wire]:
 def wire_points(nodes: Nodes, s: np.ndarray, v: np.ndarray, w: np.ndarray) -> np.ndarray:
     """Return which points, (n,), are of the wire and its clamps."""
     return (w > HEIGHT_M[0]) & (nodes.away(s, v, w) <= LIVE_M / 2)
+
+
+def wire_at(wires: Sequence[Wire], course: int, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return height and stagger of the contact wire at chainages, (n,) each, NaN without one."""
+    height, stagger = np.full((2, len(s)), np.nan)
+    for one in wires:
+        if one.course == course:
+            nodes = one.nodes
+            after = np.clip(np.searchsorted(nodes.s, s), 1, len(nodes.s) - 1)
+            near = (s >= nodes.s[0]) & (s <= nodes.s[-1]) & (nodes.s[after] - nodes.s[after - 1] <= LONGEST_GAP_M)
+            height = np.where(near, np.interp(s, nodes.s, nodes.w), height)
+            stagger = np.where(near, np.interp(s, nodes.s, nodes.v), stagger)
+    return height, stagger

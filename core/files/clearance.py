@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from ..clearance.measure import Clearance, Stations
 from ..clearance.neighbours import Side
-from ..clearance.platforms import Platform
+from ..clearance.platforms import Platform, edge_at
 from ..clearance.section import BANDS_M
-from ..clearance.wires import LONGEST_GAP_M, Nodes
+from ..clearance.wires import Nodes, wire_at
 from ..fields import CLEARANCE, INTRUSIONS, PLATFORMS, SIDES, WIRES
 from ..kilometres.axes import PlacedAxes
 from .layers import Layer
@@ -43,14 +43,14 @@ def stations_layer(found: Clearance) -> Layer:
     return Layer(CLEARANCE, columns, [place for one in found.stations for place in one.xyz])
 
 
-def _station_columns(found: Clearance, number: int, stations: Stations) -> dict[str, Sequence[Any]]:
+def _station_columns(found: Clearance, number: int, stations: Stations) -> dict[str, Any]:
     """Return the values of the fields of the stations of one track."""
     course, s = stations.course, stations.s
     curvature = course.at(s, course.curvature)
     with np.errstate(divide="ignore"):
         radius_m = np.where(np.abs(curvature) * FLATTEST_M >= 1.0, 1.0 / curvature, np.nan)
     least, unknown = stations.least_m, np.full(len(s), None, dtype=object)
-    columns: dict[str, Sequence[Any]] = {
+    columns: dict[str, Any] = {
         "track_id": np.full(len(s), course.track_id),
         "chainage_m": s,
         "cant_mm": 1000 * course.at(s, course.cant_m) if course.has_cant else np.full(len(s), np.nan),
@@ -67,40 +67,16 @@ def _station_columns(found: Clearance, number: int, stations: Stations) -> dict[
             columns[f"{one}{band + 1}_mm"] = 1000 * stations.aside_m[:, at, band]
             columns[f"{one}{band + 1}m_mm"] = 1000 * stations.margin_m[:, at, band]
         columns.update(_neighbour(found, (stations.left, stations.right)[at], one))
-        offset, height = platform_at(found, number, (1, -1)[at], s)
+        offset, height = edge_at(found.platforms, number, (1, -1)[at], s)
         columns[f"{one}off_mm"], columns[f"{one}hgt_mm"] = 1000 * offset, 1000 * height
-    height, stagger = wire_at(found, number, s)
+    height, stagger = wire_at(found.wires, number, s)
     return {**columns, "wire_mm": 1000 * height, "stagger_mm": 1000 * stagger}
 
 
-def _neighbour(found: Clearance, side: Side, one: str) -> dict[str, Sequence[Any]]:
+def _neighbour(found: Clearance, side: Side, one: str) -> dict[str, Any]:
     """Return the fields of the neighbour track on a side."""
     ids = [found.courses[at].track_id if at >= 0 else None for at in side.track]
     return {f"{one}dist_m": side.distance_m, f"{one}track": ids, f"{one}dz_mm": 1000 * side.above_m}
-
-
-def platform_at(found: Clearance, course: int, side: int, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return offset and height of the platform edge on a side of a track at chainages, (n,) each, NaN without one."""
-    offset, height = np.full((2, len(s)), np.nan)
-    for one in found.platforms:
-        if (one.course, one.side) == (course, side):
-            at = one.near(s)
-            offset = np.where(at >= 0, one.offset_m[at], offset)
-            height = np.where(at >= 0, one.height_m[at], height)
-    return offset, height
-
-
-def wire_at(found: Clearance, course: int, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return height and stagger of the contact wire at chainages, (n,) each, NaN without one."""
-    height, stagger = np.full((2, len(s)), np.nan)
-    for one in found.wires:
-        if one.course == course:
-            nodes = one.nodes
-            after = np.clip(np.searchsorted(nodes.s, s), 1, len(nodes.s) - 1)
-            near = (s >= nodes.s[0]) & (s <= nodes.s[-1]) & (nodes.s[after] - nodes.s[after - 1] <= LONGEST_GAP_M)
-            height = np.where(near, np.interp(s, nodes.s, nodes.w), height)
-            stagger = np.where(near, np.interp(s, nodes.s, nodes.v), stagger)
-    return height, stagger
 
 
 def platforms_layer(found: Clearance, axes: PlacedAxes | None) -> Layer:

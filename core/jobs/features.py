@@ -130,7 +130,7 @@ def read_lines(source: Source, progress: Progress) -> Lines:
 
 
 def read_lines_in(source: Source, crs_wkt: str | None, progress: Progress) -> Lines:
-    """Read the same lines in another coordinate system; errors as for `read_lines`, also if they can't be transformed."""
+    """Read the same lines in another coordinate system; errors as for `read_lines`, or they can't be transformed."""
     parts = (
         (feature.number, feature.row, moving)
         for feature in _placed(source, crs_wkt)

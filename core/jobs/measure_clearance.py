@@ -54,7 +54,7 @@ READING = 0.05
 """Fraction of the progress bar at which the lines are read."""
 
 HEIGHTS_OFF_M = 20.0
-"""A cloud whose middle is so far above or below the tracks has other heights: within ten metres of a track, its points
+"""A cloud whose middle is further above or below the tracks has other heights: within ten metres of a track, its points
 are on the ground or on what stands there."""
 
 
@@ -241,7 +241,9 @@ def _check_cloud(found: Clearance, progress: Progress) -> None:
         )
     used = np.flatnonzero(swept.census)
     if len(used) == 1 and used[0] not in (0, 1):
-        progress.warning(f"Every point is of class {used[0]}: take the raw cloud, which shows what is beside the rails.")
+        progress.warning(
+            f"Every point is of class {used[0]}: take the raw cloud, which shows what is beside the rails."
+        )
     unused = [str(code) for code in found.settings.left_out if not swept.census[code]]
     if unused:
         progress.warning(f"The cloud has no points of class {', '.join(unused)}, which CLASSES_OUT names.")
@@ -267,7 +269,7 @@ def _placed(found: Clearance, axes: PlacedAxes, progress: Progress) -> Clearance
 
 def _said(found: Clearance) -> list[str]:
     """Return what the user is told about the result."""
-    from ..clearance.remarks import remarks
+    from ..report.clearance_remarks import remarks
 
     return remarks(found)
 
@@ -310,8 +312,8 @@ JOB = Job(
     "Profiles are swept in the plane of both rail tops, so that cant and curves count; give Rails for the cant. Only "
     "profiles with a public source ship by name. Others are read from a file: EN 15273 and company rules are sold, or "
     "forbid copies.\n\n"
-    "This is a screening and no proof of conformity: steps between the strips of a survey, often 5 to 20 mm, are not in "
-    "the standard errors.",
+    "This is a screening and no proof of conformity: steps between the strips of a survey, often 5 to 20 mm, are not "
+    "in the standard errors.",
     (
         *(*RAIL_WORDS, *CLOUD_WORDS, *TRACK_WORDS, "clearance", "structure gauge", "loading gauge", "profile"),
         *("platform", "contact wire", "catenary", "tunnel", "Lichtraum", "Lichtraumprofil", "gabarit", "gálibo"),
@@ -371,7 +373,7 @@ JOB = Job(
         Number(
             "FLOOR",
             "Lowest height [mm]",
-            "Points lower over the rail tops are no intrusions: rails, bed, level crossings.",
+            "Points lower over the rail tops are left out: rails, bed, level crossings.",
             advanced=True,
             default=DEFAULT_FLOOR_MM,
             low=FLOOR_MM[0],

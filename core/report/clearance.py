@@ -8,22 +8,23 @@ import numpy as np
 
 from ..clearance.intrusions import Intrusion
 from ..clearance.measure import Clearance, Stations
-from ..clearance.remarks import cannot_be_judged
-from ..files.clearance import platform_at, wire_at
+from ..clearance.platforms import edge_at
+from ..clearance.wires import wire_at
 from ..polyline import runs
 from ..progress import counted, metres, written
-from .clearance_pictures import cross_section, diagram
-from .markup import figure, made, page, section, table, tiles, verdict_box
+from .clearance_pictures import RULES, cross_section, diagram
+from .clearance_remarks import cannot_be_judged
+from .markup import figure, made, note, page, section, table, tag, tiles, verdict_box
 from .origin import stated
 from .plots import Curve, Panel, broken, draw_panels
 
 NOTES = (
-    "This is a screening and no proof of conformity. The standard error holds the fit of the object's surface, the error "
-    "of the centerline, and that of the cant times the height; registration between passes, often 5 to 20 mm, is not in "
-    "it.",
-    "Penetration is that of the object's surface, not of its deepest point, which is noise. Margins of stations are those "
-    "of the third nearest point. Rails, bed, single stray points, and the vehicle of the scanner do not count; contact "
-    "wires, platforms and trains are named and do not count.",
+    "This is a screening and no proof of conformity. The standard error holds the fit of the object's surface, the "
+    "error of the centerline, and that of the cant times the height. Registration between passes, often 5 to 20 mm, is "
+    "not in it.",
+    "Penetration is that of the object's surface, not of its deepest point, which is noise. Margins of stations are "
+    "those of the third nearest point. Rails, bed, single stray points, and the vehicle of the scanner do not "
+    "count; contact wires, platforms and trains are named and do not count.",
     "Distances and heights are in the plane of both rail tops, from the middle of the track. The overhang of vehicles "
     "beyond the ends of lines is not swept.",
 )
@@ -35,8 +36,6 @@ WIRE_LIMITS = (
 
 LEAST_SPAN_MM = 20.0
 """Smallest range of a panel, so that noise does not look alarming."""
-
-Heading = Mapping[str, object]
 
 
 def clearance_page(found: Clearance, source: str, facts: Mapping[str, str]) -> str:
@@ -63,6 +62,7 @@ def clearance_page(found: Clearance, source: str, facts: Mapping[str, str]) -> s
         *_platforms(found),
         *_wires(found),
         made({**stated(found.frame.crs_wkt), **_facts(found), **facts}, NOTES),
+        style=RULES,
     )
 
 
@@ -128,13 +128,27 @@ def _tiles(found: Clearance) -> str:
 def _cross_sections(found: Clearance) -> Iterator[str]:
     if found.sections:
         drawn = (cross_section(found, one) for one in found.sections)
-        yield section("Worst cross-sections", '<div class="tiles">', *drawn, "</div>")
+        yield section("Worst cross-sections", tag("div", *drawn, class_="crosses"))
 
 
 def _intrusions(found: Clearance) -> Iterator[str]:
     if not found.intrusions:
         return
-    headings = ("No.", "Track", "Place", "Side", "Inside", "Standard error", "Height", "From", "To", "Points", "Class", "Sure", "What")
+    headings = (
+        "No.",
+        "Track",
+        "Place",
+        "Side",
+        "Inside",
+        "Standard error",
+        "Height",
+        "From",
+        "To",
+        "Points",
+        "Class",
+        "Sure",
+        "What",
+    )
     rows = [
         (
             one.intrusion,
@@ -198,7 +212,7 @@ def _platforms(found: Clearance) -> Iterator[str]:
         )
         for one in found.platforms
     ]
-    drawn = (_drawn(found, at, (1, -1), platform_at, ("Platform on the left", "Platform on the right")) for at in _with(found.platforms))
+    drawn = (_drawn(found, at) for at in _with(found.platforms))
     yield section("Platform edges", table(headings, rows), *drawn)
 
 
@@ -210,12 +224,12 @@ def _with(things: Sequence) -> list[int]:
     return sorted({one.course for one in things})
 
 
-def _drawn(found: Clearance, number: int, sides: Sequence[int], at, names: Sequence[str]) -> str:
+def _drawn(found: Clearance, number: int) -> str:
     """Draw offset and height of the platform edges of a track."""
     course, panels = found.courses[number], []
     s = np.arange(0.0, course.length_m, 1.0)
-    for side, name in zip(sides, names):
-        for what, values in zip(("offset", "height"), at(found, number, side, s)):
+    for side, name in ((1, "Platform on the left"), (-1, "Platform on the right")):
+        for what, values in zip(("offset", "height"), edge_at(found.platforms, number, side, s)):
             if np.isfinite(values).any():
                 panels.append(Panel(f"{name}: {what}", "[mm]", [Curve(s, 1000 * values)], LEAST_SPAN_MM))
     return draw_panels(f"Platforms of track {course.track_id}", panels, (0.0, course.length_m), "chainage [m]")
@@ -240,12 +254,10 @@ def _wires(found: Clearance) -> Iterator[str]:
     for number in _with(found.wires):
         course = found.courses[number]
         s = np.arange(0.0, course.length_m, 0.5)
-        height, stagger = wire_at(found, number, s)
+        height, stagger = wire_at(found.wires, number, s)
         panels = [
             Panel(name, "[mm]", [Curve(*broken(s, 1000 * values, 1.0))], LEAST_SPAN_MM)
             for name, values in (("Height", height), ("Stagger, positive to the left", stagger))
         ]
         drawn.append(draw_panels(f"Wire of track {course.track_id}", panels, (0.0, course.length_m), "chainage [m]"))
-    from .markup import note
-
     yield section("Contact wires", table(headings, rows), *drawn, note(WIRE_LIMITS))

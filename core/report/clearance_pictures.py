@@ -23,6 +23,9 @@ STRIP = 9.0
 HEAT = ((0.0, "#d62839"), (50.0, "#f28e2b"), (150.0, "#e9d66b"), (400.0, "#9fd0a8"))
 """Colours of margins in millimetres below the number; above, and where nothing is seen, the strip is empty."""
 
+RULES = ".crosses { display: grid; grid-template-columns: repeat(auto-fill, minmax(300px, 1fr)); gap: 12px; }"
+"""Style of the cross-sections: wide enough to see a centimetre."""
+
 SCALE, HALF_M, HIGH_M = 60.0, 2.9, 5.6
 """Units per metre of a cross-section, and what it shows at least: half its width, and its height."""
 
@@ -36,12 +39,13 @@ def diagram(found: Clearance, number: int) -> str:
     along = (0.0, max(course.length_m, 1.0))
     mine = [one for one in found.intrusions if one.course == number]
     shades = [*_unseen(found, stations), *_vehicles(mine)]
-    drawn = []
+    drawn: list[str] = []
     for at, (side, sense) in enumerate((("left", 1), ("right", -1))):
         margin = np.clip(1000 * stations.least_m[:, at], None, MOST_MM)
         margin[~np.isfinite(margin)] = np.nan
-        pens = [min(-one.pen_mm for one in mine)] if mine else [0.0]
-        low = min(float(np.nanmin(np.append(margin, 0.0))), max(pens[0], -MOST_MM), 0.0)
+        margin = np.clip(margin, -MOST_MM, None)
+        deepest = max((one.pen_mm for one in mine if one.counts), default=0.0)
+        low = -min(max(deepest, -float(np.nanmin(np.append(margin, 0.0)))), MOST_MM)
         panel = Panel(
             f"Least margin on the {side}",
             "[mm]; red: inside, hollow: in doubt, grey: allowed",
@@ -56,17 +60,23 @@ def diagram(found: Clearance, number: int) -> str:
         line = tag("line", x1=LEFT, x2=WIDTH - RIGHT, y1=zero, y2=zero, style="stroke: var(--offgauge)")
         drawn.append(panel.draw(frame, shades) + line + "".join(marks))
     drawn.append(_strip(stations, along, bottom_of(2) + SPACE))
-    return section(f"Track {course.track_id}", picture(f"Clearance of track {course.track_id}", drawn, along, "chainage [m]"))
+    return section(
+        f"Track {course.track_id}", picture(f"Clearance of track {course.track_id}", drawn, along, "chainage [m]")
+    )
 
 
 def _mark(frame: Frame, one: Intrusion) -> str:
     """Draw an intrusion: red if it is sure, hollow if in doubt, grey if it is allowed."""
     y = float(frame.y(max(-one.pen_mm, frame.limits[0])))
-    style = "fill: #9aa5b1" if one.what else "fill: var(--offgauge)" if one.sure else "fill: none; stroke: var(--offgauge)"
+    style = (
+        "fill: #9aa5b1" if one.what else "fill: var(--offgauge)" if one.sure else "fill: none; stroke: var(--offgauge)"
+    )
     title = f"{one.intrusion}: {one.pen_mm:.1f} ± {one.sigma_mm:.1f} mm at {one.chainage_m:,.1f} m {one.what}"
     if one.what == PLATFORM_WORDS:
         start, end = (float(frame.x(place)) for place in (one.from_m, one.to_m))
-        return tag("rect", tag("title", text(title)), x=start, y=y - 2, width=max(end - start, 2.0), height=4, style=style)
+        return tag(
+            "rect", tag("title", text(title)), x=start, y=y - 2, width=max(end - start, 2.0), height=4, style=style
+        )
     return tag("circle", tag("title", text(title)), cx=float(frame.x(one.chainage_m)), cy=y, r=4, style=style)
 
 
@@ -95,10 +105,17 @@ def _strip(stations: Stations, along: tuple[float, float], top: float) -> str:
                 for first, last in runs(colour == number):
                     x1, x2 = (float(frame.x(place)) for place in (stations.s[first] - half, stations.s[last] + half))
                     x1, x2 = max(x1, LEFT), min(x2, WIDTH - RIGHT)
-                    rows.append(tag("rect", x=x1, y=y, width=max(x2 - x1, 0.5), height=height - 1, style=f"fill: {fill}"))
+                    rows.append(
+                        tag("rect", x=x1, y=y, width=max(x2 - x1, 0.5), height=height - 1, style=f"fill: {fill}")
+                    )
     box = tag("rect", x=LEFT, y=top, width=WIDTH - LEFT - RIGHT, height=PANEL, class_="panel")
-    labels = [tag("text", text(word), x=LEFT - 8, y=top + share * PANEL, class_="tick end") for word, share in (("left", 0.3), ("right", 0.8))]
-    heading = tag("tspan", text("Margins by height"), class_="name") + text("  red below 0, orange 50, yellow 150, green 400 mm")
+    labels = [
+        tag("text", text(word), x=LEFT - 8, y=top + share * PANEL, class_="tick end")
+        for word, share in (("left", 0.3), ("right", 0.8))
+    ]
+    heading = tag("tspan", text("Margins by height"), class_="name") + text(
+        "  red below 0, orange 50, yellow 150, green 400 mm"
+    )
     return box + "".join([*rows, *labels, tag("text", heading, x=LEFT, y=top - 8, class_="heading")])
 
 
@@ -122,19 +139,35 @@ def cross_section(found: Clearance, one: CrossSection) -> str:
         parts.append(_ring([(x(v), y(w)) for v, w in grown], "fill: none; stroke: #2e7d4f; stroke-dasharray: 5 4"))
     for number, code in enumerate(np.unique(one.code).tolist()):
         mine = one.code == code
-        dots = "".join(f"M{x(v):.1f} {y(w):.1f}h.01" for v, w in zip(one.v[mine], one.w[mine]) if abs(v) < half and w < high)
+        dots = "".join(
+            f"M{x(v):.1f} {y(w):.1f}h.01" for v, w in zip(one.v[mine], one.w[mine]) if abs(v) < half and w < high
+        )
         fill = PALETTE[number % len(PALETTE)]
         parts.append(tag("path", d=dots, style=f"stroke: {fill}; stroke-width: 1.8; stroke-linecap: round; fill: none"))
     spacing = float(np.median(found.courses[one.intrusion.course].spacing_m))
     for v in (spacing / 2, -spacing / 2):
         parts.append(tag("rect", x=x(v) - 2.2, y=y(0.0), width=4.4, height=9.0, style="fill: var(--ink)"))
     place = one.intrusion
-    parts.append(tag("circle", cx=x(place.v_mm / 1000), cy=y(place.w_mm / 1000), r=6, style="fill: none; stroke: var(--offgauge); stroke-width: 2"))
-    svg = tag("svg", *parts, viewBox=f"0 0 {width:.0f} {height:.0f}", role="img", aria_label=f"Cross-section {place.intrusion}")
+    parts.append(
+        tag(
+            "circle",
+            cx=x(place.v_mm / 1000),
+            cy=y(place.w_mm / 1000),
+            r=6,
+            style="fill: none; stroke: var(--offgauge); stroke-width: 2",
+        )
+    )
+    svg = tag(
+        "svg",
+        *parts,
+        viewBox=f"0 0 {width:.0f} {height:.0f}",
+        role="img",
+        aria_label=f"Cross-section {place.intrusion}",
+    )
     where = place.km_text or f"{place.chainage_m:,.1f} m"
     words = (
         f"{place.intrusion}: track {place.track_id}, {where}, {place.side}: {written(place.pen_mm)} ± "
-        f"{written(place.sigma_mm)} mm inside{'' if place.sure else ', in doubt'}{f', {place.what}' if place.what else ''}"
+        f"{written(place.sigma_mm)} mm inside{'' if place.sure else ', in doubt'}{place.what and ', '}{place.what}"
     )
     return tag("div", svg, tag("span", text(words)), class_="tile")
 

@@ -43,7 +43,7 @@ class Way:
     grade: float
     base_m: float = 100.0
 
-    def place(self, s: np.ndarray, v: np.ndarray, w: np.ndarray) -> np.ndarray:
+    def place(self, s: np.ndarray, v: np.ndarray | float, w: np.ndarray | float) -> np.ndarray:
         """Return the places of s, v and w, (n, 3) metres."""
         s, v, w = np.broadcast_arrays(*(np.asarray(one, dtype=float) for one in (s, v, w)))
         at, heading = self.curve.chainage, np.interp(s, self.curve.chainage, self.curve.heading)
@@ -202,7 +202,9 @@ def bush(scene: Scene, s: float, side: int, aside_m: float, middle_m: float = 1.
     _truth(scene, "bush", s, side, np.column_stack([s + direction[:, 0], v, middle_m + direction[:, 2]]))
 
 
-def platform(scene: Scene, along: tuple[float, float], side: int, offset_m: float, height_m: float, face: bool = True) -> None:
+def platform(
+    scene: Scene, along: tuple[float, float], side: int, offset_m: float, height_m: float, face: bool = True
+) -> None:
     """Add a platform 3 m wide, with its vertical face unless it is seen from above only."""
     at, v = scene.patch(along, (offset_m, offset_m + 3.0))
     scene.add(at, side * v, np.full(len(at), height_m), PLATFORM)
@@ -250,7 +252,7 @@ def catenary(
     supports = np.arange(5.0, way.curve.length_m - 2.0, span_m)
     sides = stagger_m * np.where(np.arange(len(supports)) % 2, 1.0, -1.0)
     ends = way.place(supports, sides, height_m)
-    for at, (low, high) in enumerate(zip(ends, ends[1:])):
+    for low, high in zip(ends, ends[1:]):
         for lift, density in ((0.0, per_m), (1.0, per_m)):  # the wire, and the messenger over it
             share = scene.rng.uniform(0, 1, scene.rng.poisson(density * span_m))
             sag = lift * 0.5 * 4 * share * (1 - share)
@@ -288,7 +290,16 @@ def lines_of(scene: Scene) -> tuple[list[Centerline], list[RailLine]]:
             rails.append(RailLine(way.line(side * SPACING_M / 2), one, RAIL_CLASS, 1000, 5.0, 1.0, 0.0, sigmaz_mm=0.6))
         tracks.append(
             Centerline(
-                way.line(), number, RAIL_CLASS, ids[:1], ids[1:], 1000 * GAUGE_M, 0.5, 1000 * cant.mean(), 1000 * most, 0.0
+                way.line(),
+                number,
+                RAIL_CLASS,
+                ids[:1],
+                ids[1:],
+                1000 * GAUGE_M,
+                0.5,
+                1000 * cant.mean(),
+                1000 * most,
+                0.0,
             )
         )
     return tracks, rails

@@ -28,6 +28,9 @@ WORDS = {
     },
     "TRANSITIONS": {JUMPS: "Clothoids, or none", CLOTHOIDS: "Clothoids everywhere"},
     "VERTICAL_CURVES": {"CIRCLES": "Circles, as for railways", "PARABOLAS": "Parabolas, as for roads"},
+    "PROFILE": {"CUSTOM": "Custom: PROFILE_FILE"},
+    "WIDENING": {"NONE": "None", "EBO": "By the German regulations (EBO)"},
+    "TRAINS": {"MARK": "Name them, do not count them", "LEAVE_OUT": "Leave them out"},
     "TORCH": {"NONE": "Do not install", "CPU": "For the processor (CPU)", "CUDA": "For an Nvidia GPU"},
 }
 """Words by id, by parameter."""

@@ -32,8 +32,8 @@ STYLE = "rail_extract/style"
 NO_PROPERTIES: Mapping[str, str] = {}
 
 TOP_TO_BOTTOM = (
-    *("stops", "findings", "differences", "elements", "deviations", "axes", "centerlines", "airborne", "rails"),
-    *("stations", "quality", "places", "raster"),
+    *("stops", "findings", "intrusions", "differences", "elements", "deviations", "axes", "wires", "platforms"),
+    *("centerlines", "airborne", "rails", "stations", "quality", "clearance", "places", "raster"),
 )
 """Order of the layers of a run, by style: what is to be looked at first, then the lines, and what they rest on."""
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..clearance.intrusions import VEHICLE_WORDS
+from ..clearance.measure import UNSEEN_SHARE, Clearance
 from ..polyline import runs
 from ..progress import counted, metres
-from .intrusions import VEHICLE_WORDS
-from .measure import UNSEEN_SHARE, Clearance
 
 NEAR_END_M = 20.0
 """An intrusion so near to the end of a line may be entered by vehicles beyond it, which are not swept."""
@@ -28,23 +28,25 @@ def cannot_be_judged(found: Clearance) -> list[str]:
     total = sum(len(one.s) for one in found.stations)
     unseen = sum(int(found.unseen(one).sum()) for one in found.stations)
     if unseen > UNSEEN_SHARE * total:
-        reasons.append(f"Too few points are within reach on {100 * unseen / total:.0f} % of the length: {_where(found)}.")
+        reasons.append(
+            f"Too few points are within reach on {100 * unseen / total:.0f} % of the length: {_where(found)}."
+        )
     return reasons
 
 
 def _where(found: Clearance) -> str:
-    """Return the stretches without points in words, the first few."""
-    stretches = [
+    """Return the sections without points in words, the first few."""
+    sections = [
         f"track {one.course.track_id} {one.s[first]:,.0f} to {one.s[last]:,.0f} m"
         for one in found.stations
         for first, last in runs(found.unseen(one))
     ]
-    more = f" and {len(stretches) - MOST_NAMED} more" if len(stretches) > MOST_NAMED else ""
-    return ", ".join(stretches[:MOST_NAMED]) + more
+    more = f" and {len(sections) - MOST_NAMED} more" if len(sections) > MOST_NAMED else ""
+    return ", ".join(sections[:MOST_NAMED]) + more
 
 
 MOST_NAMED = 4
-"""Stretches that a sentence names."""
+"""Sections that a sentence names."""
 
 
 def remarks(found: Clearance) -> list[str]:
@@ -52,9 +54,7 @@ def remarks(found: Clearance) -> list[str]:
     said = cannot_be_judged(found)
     for track in sorted({found.courses[at].track_id for at, *_ in found.vehicle}):
         starts = sorted({s for at, s, *_ in found.vehicle if found.courses[at].track_id == track})
-        said.append(
-            f"The vehicle of the scanner was left out on track {track}, from {starts[0]:,.0f} m on: cells that move along."
-        )
+        said.append(f"The vehicle of the scanner was left out on track {track}, from {starts[0]:,.0f} m on.")
     for one in found.intrusions:
         if one.what.startswith(VEHICLE_WORDS.format("")):
             said.append(
@@ -63,11 +63,13 @@ def remarks(found: Clearance) -> list[str]:
             )
     for course in found.courses:
         if (np.abs(course.curvature) * TIGHTEST_M > 1.0).any() and found.settings.widening != "NONE":
-            said.append(f"Track {course.track_id} is tighter than {TIGHTEST_M:g} m: the last row of the table was used.")
+            said.append(
+                f"Track {course.track_id} is tighter than {TIGHTEST_M:g} m: the last row of the table was used."
+            )
     near = [one for one in found.sure if _to_end(found, one.course, one.chainage_m) < NEAR_END_M]
     if near:
         said.append(
-            f"{counted(len(near), 'intrusion')} within {metres(NEAR_END_M)} of the end of a line: vehicles beyond it are "
+            f"{counted(len(near), 'intrusion')} within {metres(NEAR_END_M)} of the end of a line: vehicles beyond are "
             "not swept."
         )
     return said
@@ -76,5 +78,3 @@ def remarks(found: Clearance) -> list[str]:
 def _to_end(found: Clearance, course: int, chainage_m: float) -> float:
     """Return the distance of a place from the nearer end of its track."""
     return min(chainage_m, found.courses[course].length_m - chainage_m)
-
-
