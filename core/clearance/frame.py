@@ -13,7 +13,7 @@ import numpy as np
 from scipy.signal import savgol_filter
 from scipy.spatial import cKDTree
 
-from ..polyline import Chords, Polyline
+from ..polyline import STATION_M, Chords, Polyline
 from ..rails import Centerline, RailLine
 
 STEP_M = 0.5
@@ -225,7 +225,7 @@ def _cant(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return cant and spacing, NaN where a rail is missing, and where one has no points; (n,) each."""
     left = np.column_stack([-np.sin(heading), np.cos(heading)])
-    chords = Chords.of([rail.line for rail in rails], STEP_M)
+    chords = Chords.of([rail.line for rail in rails], STATION_M)
     if not rails or not len(chords.first):
         return (*np.full((2, len(xyz)), np.nan), np.zeros(len(xyz), dtype=bool))
     feet, hidden = [], np.zeros(len(xyz), dtype=bool)
@@ -243,7 +243,7 @@ def _cant(
 
 def rail_offsets(course: Course, rails: Sequence[RailLine]) -> tuple[float, float]:
     """Return the median distances of the left and of the right rail from a centerline; NaN where there is none."""
-    chords = Chords.of([rail.line for rail in rails], STEP_M)
+    chords = Chords.of([rail.line for rail in rails], STATION_M)
     left = np.column_stack([-np.sin(course.heading), np.cos(course.heading)])
     found = []
     for side in (1.0, -1.0):

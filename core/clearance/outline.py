@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import cached_property
 
 import numpy as np
-from scipy.ndimage import map_coordinates
+from scipy.ndimage import binary_dilation, map_coordinates
 
 from ..clouds.mask import Mask
 from .profiles import Profile
@@ -43,8 +43,9 @@ class Outline:
 
     def distance(self, vw: np.ndarray) -> np.ndarray:
         """Return the distance of points, (n, 2), to the outline, (n,), positive inside; exact above -`NEAR_M`."""
-        found = self._from_table(vw)
-        near = found > -NEAR_M - CELL_M
+        away, may_be_inside = self._from_table(vw)
+        near = may_be_inside | (away < NEAR_M)
+        found = -away
         found[near] = self.exact(vw[near])
         return found
 
@@ -71,16 +72,20 @@ class Outline:
         return best, number
 
     @cached_property
-    def _table(self) -> np.ndarray:
-        """Signed distances at the nodes of a grid, (rows, columns)."""
+    def _table(self) -> tuple[np.ndarray, np.ndarray]:
+        """Distances at the nodes of a grid, (rows, columns), and whether places around a node may be inside."""
         v = np.arange(self._low[0], self._high[0] + CELL_M, CELL_M)
         w = np.arange(self._low[1], self._high[1] + CELL_M, CELL_M)
-        return self.exact(np.stack(np.meshgrid(v, w), axis=-1).reshape(-1, 2)).reshape(len(w), len(v))
+        nodes = np.stack(np.meshgrid(v, w), axis=-1).reshape(-1, 2)
+        inside = self._mask.holds(nodes).reshape(len(w), len(v))
+        return self._to_edges(nodes)[0].reshape(inside.shape), binary_dilation(inside, np.ones((3, 3)))
 
-    def _from_table(self, vw: np.ndarray) -> np.ndarray:
-        """Return distances interpolated in the table."""
-        column, row = ((vw - self._low) / CELL_M).T
-        return map_coordinates(self._table, [row, column], order=1, mode="nearest")
+    def _from_table(self, vw: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return distances interpolated in the table, and which points may be inside, (n,) each."""
+        away, inside = self._table
+        place = ((vw - self._low) / CELL_M).T[::-1]
+        row, column = (np.clip(np.rint(one), 0, size - 1).astype(int) for one, size in zip(place, away.shape))
+        return map_coordinates(away, place, order=1, mode="nearest"), inside[row, column]
 
 
 def _is_foot(start: np.ndarray, end: np.ndarray) -> np.ndarray:

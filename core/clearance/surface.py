@@ -118,13 +118,13 @@ def _on_surface(design: np.ndarray, h: np.ndarray, noise_m: float) -> np.ndarray
     """Return which points, (n,) bool, are of the surface; None if too many points lie above one."""
     weights = np.ones(len(h))
     for _ in range(ENVELOPE_ROUNDS):
-        c = _solved(design, h, weights)
+        c = _bulging(design, h, weights)
         weights = np.where(h > design @ c, 1.0, BELOW_WEIGHT)
     near = np.abs(h - design @ c) <= NEAR_SIGMAS * noise_m
     for _ in range(PLAIN_ROUNDS):
         if near.sum() < LEAST_POINTS:
             return None
-        c = _solved(design[near], h[near])
+        c = _bulging(design[near], h[near])
         bend = design[:, 2:] @ c[2:]
         on_top = bend >= bend[near].max() - DROP_M
         near = on_top & (np.abs(h - design @ c) <= NEAR_SIGMAS * noise_m)
@@ -134,7 +134,7 @@ def _on_surface(design: np.ndarray, h: np.ndarray, noise_m: float) -> np.ndarray
 
 def _smoothed(design: np.ndarray, h: np.ndarray, noise_m: float) -> tuple[np.ndarray, np.ndarray]:
     """Return the surface at its points, a plane or cylinder whose slopes and bend are sure, and errors."""
-    kept = [0, 1, 2, 3]
+    kept = [0, 1, 2, 3] if _solved(design, h)[3] < 0 else [0, 1, 2]
     while True:
         own = design[:, kept]
         c = _solved(own, h)
@@ -146,6 +146,12 @@ def _smoothed(design: np.ndarray, h: np.ndarray, noise_m: float) -> tuple[np.nda
         if len(kept) == 1 or sure[weakest] >= SURE_SLOPE:
             return own @ c, np.sqrt(np.einsum("ij,jk,ik->i", own, spread, own))
         del kept[weakest]
+
+
+def _bulging(design: np.ndarray, values: np.ndarray, weights: np.ndarray | None = None) -> np.ndarray:
+    """Return the coefficients, of which the bend is not hollow: a mast is round, and hollow ends would be noise."""
+    c = _solved(design, values, weights)
+    return c if c[3] <= 0 else np.append(_solved(design[:, :3], values, weights), 0.0)
 
 
 def _solved(design: np.ndarray, values: np.ndarray, weights: np.ndarray | None = None) -> np.ndarray:

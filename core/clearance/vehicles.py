@@ -13,6 +13,9 @@ OWN_CELL_M, OWN_LENGTH_M, OWN_SHARE = 0.10, 50.0, 0.5
 """Cells across the track that are filled in more than this share of the metres over such a length move along with the
 scanner."""
 
+OWN_AROUND_M = 25.0
+"""Length on both sides of such a part that is looked at with it: where the track ends, the part is short."""
+
 OWN_ASIDE_M, OWN_HEIGHT_M = 1.0, (0.3, 4.0)
 """Where such cells are of the own vehicle: nothing else stands there over such a length on a track on which trains
 run."""
@@ -45,16 +48,19 @@ def own_vehicle(
     """Return which points, (n,), are of the vehicle that carried the scanner, and s, v and w of its cells."""
     may = np.flatnonzero((np.abs(v) < OWN_ASIDE_M) & (w > OWN_HEIGHT_M[0]) & (w < OWN_HEIGHT_M[1]))
     found, cells = np.zeros(len(s), dtype=bool), []
-    block, metre = np.floor(s / OWN_LENGTH_M).astype(np.int64), np.floor(s).astype(np.int64)
-    for one in np.unique(block[may]).tolist():
-        mine = may[block[may] == one]
-        length = len(np.unique(metre[block == one]))
+    metre = np.floor(s).astype(np.int64)
+    for one in np.unique(np.floor(s[may] / OWN_LENGTH_M)).tolist():
+        start, end = one * OWN_LENGTH_M, (one + 1) * OWN_LENGTH_M
+        around = (s >= start - OWN_AROUND_M) & (s < end + OWN_AROUND_M)
+        length = len(np.unique(metre[around]))
+        mine = may[around[may]]
         place = np.floor(np.column_stack([v[mine], w[mine]]) / OWN_CELL_M).astype(np.int64)
         filled, cell = np.unique(place, axis=0, return_inverse=True)
         both = np.unique(np.column_stack([cell.ravel(), metre[mine]]), axis=0)
-        is_own = np.bincount(both[:, 0], minlength=len(filled)) > OWN_SHARE * max(length, OWN_LENGTH_M / 2)
-        found[mine] = is_own[cell.ravel()]
-        cells += [(one * OWN_LENGTH_M, *row) for row in ((filled[is_own] + 0.5) * OWN_CELL_M).tolist()]
+        is_own = np.bincount(both[:, 0], minlength=len(filled)) > OWN_SHARE * max(length, OWN_LENGTH_M)
+        own = mine[is_own[cell.ravel()]]
+        found[own[(s[own] >= start) & (s[own] < end)]] = True
+        cells += [(start, *row) for row in ((filled[is_own] + 0.5) * OWN_CELL_M).tolist()]
     return found, tuple(cells)
 
 

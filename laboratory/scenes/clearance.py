@@ -8,10 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 
-from ...core.frame import LocalFrame
+from ...core.clearance.frame import Course, course_of
+from ...core.clouds.las import laspy
 from ...core.rails import Centerline, RailLine
 from ...core.standards import RAIL_CLASS
 from ..curves import Curve, Element, trace
@@ -21,6 +23,9 @@ GAUGE_M, SPACING_M = 1.435, 1.507
 
 OBJECT, BED, PLATFORM, WIRE, BUSH, TRAIN = 6, 2, 6, 14, 4, 6
 """Classes of the points."""
+
+SCALE_M = 0.0005
+"""Resolution of the coordinates in the file: a tenth of the noise."""
 
 VERTEX_M = 0.5
 """Distance of the vertices of the true lines: on R 300, chords of half a metre are within 0.1 mm of the curve."""
@@ -311,5 +316,22 @@ def offsets() -> Iterator[float]:
         yield from (size, -size)
 
 
-FRAME = LocalFrame(np.zeros(3))
-"""Local metres are the coordinates of the file."""
+SHORT = Element(30.0), Element(20.0, 0.0, 1 / 300), Element(40.0, 1 / 300, 1 / 300)
+"""A straight, a clothoid and an arc to the left, for tests."""
+
+
+def courses_of(scene: Scene, with_rails: bool = True) -> list[Course]:
+    """Return the tracks of a scene as the sweep needs them."""
+    tracks, rails = lines_of(scene)
+    own = [[one for one in rails if one.rail_id in (*track.left_ids, *track.right_ids)] for track in tracks]
+    return [course_of(track, some if with_rails else []) for track, some in zip(tracks, own)]
+
+
+def write_points(path: Path, xyz: np.ndarray, code: np.ndarray) -> None:
+    """Write points, (n, 3), with classes, (n,), without a coordinate system."""
+    header = laspy.LasHeader(version="1.4", point_format=6)
+    header.scales = np.full(3, SCALE_M)
+    cloud = laspy.LasData(header)
+    cloud.x, cloud.y, cloud.z = xyz.T
+    cloud.classification = code
+    cloud.write(str(path))
