@@ -268,8 +268,9 @@ def _stations(
     course = courses[at]
     s = settings.step_m * np.arange(int(course.length_m / settings.step_m) + 1)
     bands = np.full((2, len(s) * 2 * len(BANDS_M)), np.nan)
-    number = np.minimum(np.rint(course.s / settings.step_m).astype(np.int64), len(s) - 1)
-    points = np.bincount(number, swept.seen[at], len(s)).astype(np.int64)
+    borders = np.append(s - settings.step_m / 2, s[-1] + settings.step_m / 2)
+    passed = np.interp(borders, course.s + course.step_m / 2, np.cumsum(swept.seen[at]), left=0.0)
+    points = np.rint(np.diff(passed)).astype(np.int64)
     mine = [one for key, one in sorted(found.items()) if key[0] == at]
     if mine:
         least = Least.joined([one.least for one in mine])
