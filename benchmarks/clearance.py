@@ -21,6 +21,7 @@ from rail_extract.core.clearance.profiles import named
 from rail_extract.core.clouds.points import ask
 from rail_extract.core.run.loop import Runner
 from rail_extract.laboratory.scenes import clearance as scenes
+from scipy.ndimage import gaussian_filter1d
 from scipy.spatial import cKDTree
 
 DENSITIES = {1: 400.0, 2: 600.0, 3: 800.0, 4: 1000.0, 5: 1500.0}
@@ -34,7 +35,10 @@ STEP_M, NEAR_M = 3.0, 1.2
 """Distance of the objects, and up to which a result belongs to one."""
 
 ACROSS_M, UP_M = 0.0010, 0.0006
-"""Errors of the rails across and in height, constant along each rail."""
+"""Standard errors of the rails across and in height."""
+
+CORRELATED_M = 4.0
+"""Length over which these errors wander: about that over which extracted rails are smoothed."""
 
 DEPTHS_M = (0.005, 0.008, 0.015, 0.030, 0.080, 0.150)
 SURE_M = 0.015
@@ -71,25 +75,24 @@ def main() -> None:
         things(seed, density, score)
         errors, sigmas = (np.array(one[before[0] :]) for one in (score.errors, score.sigmas))
         counts = (score.inside - before[1], score.missed - before[2], score.false - before[3])
-        print(
-            f"{seed:4d} {density:7.0f} {points / 1e6:6.1f}M {counts[0]:7d} {counts[1]:6d} {counts[2]:6d} {_row(errors, sigmas)} {spent:8.1f}"
-        )
-    print(
-        f"all{'':20s}{score.inside:7d} {score.missed:6d} {score.false:6d} {_row(np.array(score.errors), np.array(score.sigmas))}"
-    )
+        said = " ".join(f"{one:6d}" for one in counts)
+        print(f"{seed:4d} {density:7.0f} {points / 1e6:6.1f}M  {said} {_row(errors, sigmas)} {spent:9.1f}", flush=True)
+    said = " ".join(f"{one:6d}" for one in (score.inside, score.missed, score.false))
+    print(f"{'all':22s}{said} {_row(np.array(score.errors), np.array(score.sigmas))}")
     for name, values in (("platform offset, height", score.platforms), ("wire stagger, height", score.wires)):
         table = np.array(values)
-        print(
-            f"{name}: mean {table.mean(axis=0).round(2)}, rms {np.sqrt((table**2).mean(axis=0)).round(2)}, largest {np.abs(table).max(axis=0).round(1)} mm"
-        )
+        mean, rms, most = table.mean(axis=0), np.sqrt((table**2).mean(axis=0)), np.abs(table).max(axis=0)
+        print(f"{name}: mean {mean.round(2)}, rms {rms.round(2)}, largest {most.round(1)} mm")
     distances = np.array(score.distances)
     print(f"track distance: rms {np.sqrt(np.mean(distances**2)):.2f}, largest {np.abs(distances).max():.2f} mm")
     print(f"memory: {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6:.2f} GB at most")
 
 
 def _row(errors: np.ndarray, sigmas: np.ndarray) -> str:
+    """Return root mean square, largest, and per cent within one and two standard errors."""
     size = np.abs(errors)
-    return f"{np.sqrt(np.mean(errors**2)):5.2f} {size.max():5.1f} {100 * np.mean(size < sigmas):4.0f} {100 * np.mean(size < 2 * sigmas):4.0f}"
+    within = (100 * np.mean(size < factor * sigmas) for factor in (1, 2))
+    return f"{np.sqrt(np.mean(errors**2)):5.2f} {size.max():5.1f} " + " ".join(f"{one:4.0f}" for one in within)
 
 
 def run(scene: scenes.Scene, rng: np.random.RandomState) -> tuple[Clearance, float]:
@@ -111,17 +114,17 @@ def _courses(scene: scenes.Scene, rng: np.random.RandomState) -> list[Course]:
         own = []
         for rail in rails:
             if rail.rail_id in (*track.left_ids, *track.right_ids):
-                off = np.append(ACROSS_M * rng.standard_normal() * _aside(rail.xyz), UP_M * rng.standard_normal())
-                own.append(replace(rail, xyz=rail.xyz + off))
+                across, up = ACROSS_M * _wandering(rng, len(rail.xyz)), UP_M * _wandering(rng, len(rail.xyz))
+                own.append(replace(rail, xyz=rail.xyz + np.column_stack([across[:, None] * rail.line.normals, up])))
         middle = (own[0].xyz + own[1].xyz) / 2
         made.append(course_of(replace(track, xyz=middle), own))
     return made
 
 
-def _aside(xyz: np.ndarray) -> np.ndarray:
-    """Return the unit vector to the left of the middle of a line, (2,)."""
-    along = xyz[len(xyz) // 2 + 1, :2] - xyz[len(xyz) // 2 - 1, :2]
-    return np.array([-along[1], along[0]]) / np.hypot(*along)
+def _wandering(rng: np.random.RandomState, count: int) -> np.ndarray:
+    """Return errors of a line, (count,), with a standard deviation of 1 that wander over some metres."""
+    found = gaussian_filter1d(rng.standard_normal(count + 200), CORRELATED_M / scenes.VERTEX_M)[100:-100]
+    return found * np.sqrt(2 * np.sqrt(np.pi) * CORRELATED_M / scenes.VERTEX_M)
 
 
 def objects(seed: int, density: float, score: Score) -> tuple[int, float]:

@@ -25,7 +25,7 @@ SAME_SIGMAS = 2.0
 SURE_SIGMAS = 2.0
 """An object is inside for sure if its depth exceeds this number of standard errors."""
 
-FIT_FACTOR = 1.25
+FIT_FACTOR = 1.6
 """What the standard error of a fit is multiplied by: points of one surface share what the fit does not know, such as
 the bend of a pole."""
 

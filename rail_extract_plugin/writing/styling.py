@@ -23,8 +23,8 @@ from ..paths import STYLES
 from .run import LAYER, RUN, name_run
 from .view_3d import show_lines_in_3d
 
-FINDINGS = "findings"
-"""Style of the findings, which the user is asked to review."""
+FINDINGS = "findings", "intrusions"
+"""Styles of the layers that the user is asked to review."""
 
 STYLE = "rail_extract/style"
 """Name of the property that states the style of a layer."""
@@ -62,7 +62,7 @@ class _Styler(QgsProcessingLayerPostProcessorInterface):
         if run:
             _put_into_group(layer, run)
         layer.triggerRepaint()
-        if self._style == FINDINGS:
+        if self._style in FINDINGS:
             notices.findings_loaded.emit(layer.id())
 
 

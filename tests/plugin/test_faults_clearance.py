@@ -73,7 +73,7 @@ FAULTS = {
         "tracks of another place": given(shift=(0.0, 5000.0, 0.0)),
         "cloud with other heights": given(shift=(0.0, 0.0, -46.0)),
         "class that the cloud lacks": given(CLASSES_OUT="5"),
-        "classes that are no numbers": given(CLASSES_OUT="trees"),
+        "classes in words": given(CLASSES_OUT="trees"),
         "cloud of rail points": given(class_code=10),
     },
 }
