@@ -50,15 +50,7 @@ SHOWN = 3
 
 @dataclass(frozen=True)
 class Switch:
-    """A rule and what stands in for it when it is off.
-
-    Attributes
-    ----------
-    name : str
-        Module and rule.
-    off : tuple of (str, str, object)
-        Module below `rail_extract.core`, name in it, and its value when the rule is off.
-    """
+    """A rule, and by module below `rail_extract.core` and name in it, the values that replace it when it is off."""
 
     name: str
     off: tuple[tuple[str, str, Any], ...]
@@ -111,7 +103,7 @@ SWITCHES = (
     _rule("tracks.chaining._facing", lambda *_: np.empty((0, 2), dtype=int)),
     _rule("tracks.chaining.MAX_HIDDEN_M", 0.0),
     _rule("tracks.centerlines.fork_centerlines", lambda lines, *_: list(lines)),
-    _rule("tracks.forking.BENT_M", np.inf),
+    _rule("tracks.centerlines.BENT_M", np.inf),
     _rule("tracks.centerlines.started_abreast", lambda rails: list(rails)),
     _rule("tracks.centerlines.at_gauge", lambda left, right, *_: (left, right)),
     _rule("tracks.centerlines._smoothed", first),
@@ -156,7 +148,7 @@ SWITCHES = (
     _rule("airborne.fitting.certainty", lambda course, *_: np.ones(len(course.across))),
     _rule("airborne.rounds.measure", lambda corridor, shape, shows: (shape, np.nan)),
     _rule("airborne.rounds.REACHES_M", (0.25,)),
-    _rule("airborne.cross_sections._other_spacing", lambda count, mean, u, shape: np.nan),
+    _rule("airborne.ridges._other_spacing", lambda count, mean, u, shape: np.nan),
     _rule("airborne.curves._distances", nothing),
     _rule("airborne.curves._spread", lambda *_: 1.0),
     _rule("airborne.curves.OUTLIER", np.inf),
@@ -245,13 +237,7 @@ def _largest(moved: Sequence[Difference]) -> str:
 
 
 def ablate(task: tuple[str, Sequence[str], str]) -> dict[str, list[Difference]]:
-    """Run a scene with all rules, and without each of those that have an effect in it.
-
-    Returns
-    -------
-    dict of str to list of Difference
-        By name of the rules that have an effect; the list has the figures that moved.
-    """
+    """Run a scene with all rules and without each; returns the figures that moved, by the rules that have an effect."""
     place, names, name = task
     variant = next(one for one in VARIANTS if one.name == name)
     scene = build_scene(place, variant.seed_shift)

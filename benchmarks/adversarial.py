@@ -41,14 +41,7 @@ def main() -> None:
 
 
 def row(scene: Scene, network: RailNetwork) -> str:
-    """Write the row of a scene.
-
-    Parameters
-    ----------
-    scene : Scene
-    network : RailNetwork
-        What was extracted from it, with the geometry of its tracks.
-    """
+    """Write the row of a scene, from what was extracted of it with the geometry of its tracks."""
     figures = line_figures(scene, network)
     gauge = " ".join(f"{line.gauge_mm:.0f}" for line in network.centerlines)
     _, words = verdict(examine(network, (scene.standard.gauge_m,))) if network.centerlines else ("", "no track")

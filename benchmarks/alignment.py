@@ -17,7 +17,7 @@ from functools import partial
 import numpy as np
 from rail_extract.core.alignment.elements import Alignment
 from rail_extract.core.alignment.fit import fit_track
-from rail_extract.core.alignment.held import noted
+from rail_extract.core.alignment.layouts import noted
 from rail_extract.core.parameters import FitParameters
 from rail_extract.laboratory.designs import FAMILIES, Family, random_design, surveyed, with_cant
 from rail_extract.laboratory.ruler.alignments import Met, bound_of, compared, quantiles, together
@@ -105,22 +105,10 @@ def row_of(
     elements: int = 100,
     given: bool = False,
 ) -> str:
-    """Fit designs, and return a row of the table.
+    """Fit a design of each family, and return a row of the table.
 
-    Parameters
-    ----------
-    seed : int
-    title : str
-    families : list of Family
-        One for each design.
-    white_m : float
-    shared : (float, float)
-        Standard deviation and correlation length of the misalignment, metres.
-    length_m : float, optional
-        Length to which the design is cut; else it has `elements`.
-    elements : int
-    given : bool
-        Whether the fit is given the types of the true elements.
+    `shared` is the standard deviation and the correlation length of the misalignment, metres. Designs are cut to
+    `length_m` or else have as many elements; with `given`, the fit knows their types.
     """
     met, seconds, kilometres = [], 0.0, 0.0
     for number, family in enumerate(families):

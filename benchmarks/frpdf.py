@@ -64,7 +64,6 @@ class Tally:
         Cells of guard rails and lone lines: removed ones, all.
     rare : dict of str to Scores
         Within one cell, for each kind of rare rasters.
-    parameters : int or None
     seconds : float
         Per raster.
     memory_mib : float

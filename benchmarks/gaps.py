@@ -53,16 +53,7 @@ def main() -> None:
 
 
 def bridged_share(cleaner: Cleaner, length_m: float, reach_m: float, count: int) -> float:
-    """Return the share of gaps that are bridged; gaps at the border of a raster are left out.
-
-    Parameters
-    ----------
-    cleaner : Cleaner
-    length_m, reach_m : float
-        See `cut`.
-    count : int
-        Number of rasters.
-    """
+    """Return the share of gaps, made by `cut`, that are bridged; those at the border of a raster are left out."""
     results = [
         bridged(np.asarray(cleaner(observed)) >= 0.5, gap).values()
         for observed, gap in gapped_rasters(length_m, reach_m, count)
@@ -79,22 +70,10 @@ def gapped_rasters(length_m: float, reach_m: float, count: int) -> Iterator[tupl
 
 
 def cut(pair: Pair, rng: np.random.Generator, length_m: float, reach_m: float) -> tuple[np.ndarray, np.ndarray]:
-    """Clear a rectangle along a rail near the middle of the raster.
+    """Clear a rectangle along a rail near the middle of the raster, `reach_m` to each side of it.
 
-    Parameters
-    ----------
-    pair : Pair
-    rng : numpy Generator
-    length_m : float
-        Length along the rail.
-    reach_m : float
-        Half the width; for both rails of a track, measured from the axis of the track.
-
-    Returns
-    -------
-    observed : bool array
-    gap : int array
-        1 in the cells of the label in the rectangle; 0 elsewhere.
+    For both rails of a track, the reach is measured from its axis. Returns the raster, and the gap as 1 in the cells of
+    the label in the rectangle.
     """
     cells = np.argwhere(pair.label)
     middle = np.array(pair.label.shape) / 2
@@ -118,20 +97,9 @@ def _to_the_axis(cells: np.ndarray, place: np.ndarray, across: np.ndarray) -> fl
 
 
 def ratio_scores(cleaner: Cleaner, ratio: float, count: int) -> tuple[Scores, Scores]:
-    """Clean rasters of each family and severity at a ratio.
+    """Clean rasters of each family and severity at a ratio of gauge to railhead width.
 
-    Parameters
-    ----------
-    cleaner : Cleaner
-    ratio : float
-        Gauge divided by railhead width.
-    count : int
-        Number of rasters.
-
-    Returns
-    -------
-    strict, tolerant : Scores
-        Strict counts, and counts within one cell.
+    Counts are strict, and within one cell.
     """
     strict = tolerant = Scores()
     for number in range(count):

@@ -14,8 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from rail_extract.core.grow.growth import APART, Growth, Growths, apart_first, grow
-from rail_extract.core.grow.heads import Rail
-from rail_extract.core.grow.settings import GrowSettings
+from rail_extract.core.grow.heads import GrowSettings, Rail
 from rail_extract.core.polyline import Polyline, project
 from rail_extract.laboratory.ruler.classification import truth
 from rail_extract.laboratory.ruler.lines import cut

@@ -16,7 +16,7 @@ from itertools import combinations, groupby
 from pathlib import Path
 
 import numpy as np
-from rail_extract.core.checks.gauge_estimate import measure_spacings
+from rail_extract.core.checks.points import measure_spacings
 from rail_extract.core.classify.settings import Settings
 from rail_extract.core.clouds.las import laspy
 from rail_extract.core.clouds.on_heads import on_heads
@@ -49,19 +49,9 @@ PLACES = 20
 
 @dataclass(frozen=True)
 class DataSet:
-    """How the files of a data set are named and labelled.
+    """How the files of a data set are named, with the groups `run` and `part`, and labelled.
 
-    Attributes
-    ----------
-    name : str
-    file : Pattern
-        Of the names of files, with the groups `run` and `part`.
-    rail_class : int
-    standard : str
-    files_in_place : int
-        Files next to each other that are evaluated together.
-    registered : bool
-        Whether all runs have the same coordinates.
+    `files_in_place` next to each other are evaluated together; registered runs have the same coordinates.
     """
 
     name: str
@@ -176,10 +166,7 @@ def parsed(words: Sequence[str] | None) -> argparse.Namespace:
 def find_places(folder: Path) -> tuple[DataSet, list[Place]]:
     """Recognize the data set by the names of the files, and group the files of each place.
 
-    Raises
-    ------
-    ParameterError
-        The folder has no point clouds.
+    Raises ParameterError if the folder has no point clouds.
     """
     paths = sorted(path for path in folder.rglob("*") if path.suffix.lower() in (".las", ".laz"))
     if not paths:
@@ -201,13 +188,7 @@ def find_places(folder: Path) -> tuple[DataSet, list[Place]]:
 
 
 def chosen_standard(data: DataSet) -> RailStandard:
-    """Look up the rail standard.
-
-    Raises
-    ------
-    ParameterError
-        None is known for these files, or the name is unknown.
-    """
+    """Look up the rail standard; raises ParameterError if none is known for these files, or its name is unknown."""
     if not data.standard:
         raise ParameterError(
             "The names of the files are those of neither RailCloud-HdF nor SemanticRail3D: give --standard and "
@@ -224,13 +205,7 @@ def spread(places: list[Place], count: int) -> list[Place]:
 
 
 def covered_twice(places: list[Place]) -> list[Place]:
-    """Return the places whose extent meets that of a place of another run.
-
-    Raises
-    ------
-    ParameterError
-        There are none.
-    """
+    """Return the places whose extent meets that of a place of another run; raises ParameterError if there are none."""
     boxes = []
     for place in places:
         headers = [_header(path) for path in place.files]
@@ -339,15 +314,7 @@ def draw(
 
 
 def compare(rails: Sequence[RailLine], heads: np.ndarray) -> tuple[int, int, float, np.ndarray, np.ndarray]:
-    """Compare lines with labelled points on heads, (n, 3).
-
-    Returns
-    -------
-    cells, cells_right : int
-    right_m : float
-    across_m, height_m : (k,) array
-        See `Result`.
-    """
+    """Compare lines with labelled points on heads, (n, 3); differences are those of `Result`."""
     cells = np.floor(heads[:, :2] / CELL_M).astype(np.int64)
     count = len(np.unique(cells, axis=0))
     chords = cut([one.xyz for one in rails])

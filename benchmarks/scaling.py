@@ -38,11 +38,11 @@ from rail_extract.core.run.cluster import Cluster, started
 from rail_extract.core.run.loop import Answer, Runner, next_of
 from rail_extract.core.run.tasks import Context, Once, Task
 from rail_extract.core.squares.kept import KeptResults
-from rail_extract.core.squares.pieces import SquareRails, trim
+from rail_extract.core.squares.seams import SquareRails, trim
 from rail_extract.core.squares.steps import engine_for, square_side
 from rail_extract.core.standards import STANDARDS
 from rail_extract.core.tiles.grid import HALO_M, Square
-from rail_extract.core.tiles.spool import SpooledPoints, spool
+from rail_extract.core.tiles.store import SpooledPoints, spool
 from rail_extract.laboratory.curves import Element, trace
 from rail_extract.laboratory.scenes.plain import spacing
 from rail_extract.laboratory.scenes.scanner import Scanner
@@ -110,16 +110,7 @@ def main() -> None:
 
 
 def compare_lengths(folder: Path, km: float, times: int) -> dict:
-    """Run a short and a long track, each in a separate process, and return the figures of the long one.
-
-    Parameters
-    ----------
-    folder : Path
-    km : float
-        Length of the short track.
-    times : int
-        Ratio of the two lengths.
-    """
+    """Run tracks of `km` and `times` as much, each in a separate process, and return the figures of the long one."""
     lay_track(folder / "short", km)
     lay_track(folder / "long", km * times)
     short = show(f"{km:g} km", in_own_process(folder / "short", DRAWN))
@@ -167,13 +158,7 @@ def compare_processes(tiles: Path) -> None:
 
 
 class Threads:
-    """Executes tasks on threads of this process, to compare with processes: Python runs one of them at a time.
-
-    Parameters
-    ----------
-    places : int
-        Number of threads.
-    """
+    """Executes tasks on threads of this process, to compare with processes: Python runs one of them at a time."""
 
     def __init__(self, places: int) -> None:
         self.places = places

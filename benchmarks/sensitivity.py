@@ -66,17 +66,9 @@ class Outcome:
 def track_scene(
     scanner: Scanner = SCANNER, curvature: float = 0.0, heading: float = HEADING, gap_m: float = 0.0
 ) -> Scene:
-    """Build a scene of one plain track.
+    """Build a scene of one plain track, with gaps of this length or none.
 
-    Parameters
-    ----------
-    scanner : Scanner
-    curvature : float
-        1/m.
-    heading : float
-        Direction at the start, radians.
-    gap_m : float
-        Length of the gaps; 0 leaves them out.
+    The curvature is in 1/m, the heading at the start in radians.
     """
     curve = trace([Element(LENGTH_M, curvature, curvature)], heading=heading)
     gaps: dict[tuple[int, int], Gaps] = {}
@@ -162,18 +154,7 @@ def _row(outcome: Outcome) -> str:
 
 
 def draw(outcomes: dict[str, list[Outcome]], figure: str, label: str, path: Path) -> None:
-    """Draw one kind of error over all sweeps.
-
-    Parameters
-    ----------
-    outcomes : dict of name to list of Outcome
-    figure : str
-        Name of an attribute of `Comparison`.
-    label : str
-        Of the vertical axis.
-    path : Path
-        PNG to write.
-    """
+    """Draw one kind of error, an attribute of `Comparison`, over all sweeps as PNG."""
     import matplotlib
 
     matplotlib.use("Agg")

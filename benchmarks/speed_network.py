@@ -15,7 +15,7 @@ from rail_extract.core.clouds.points import RailPoints
 from rail_extract.core.frpdf import START
 from rail_extract.core.frpdf.architecture import BASE, architecture_of, fold
 from rail_extract.core.frpdf.cleanup import clean
-from rail_extract.core.frpdf.corridor import Piece, lay_fields
+from rail_extract.core.frpdf.corridor import Rectangle, lay_batches
 from rail_extract.core.frpdf.engine import Engine
 from rail_extract.core.frpdf.network import FRPDF, set_weights
 from rail_extract.core.frpdf.onnx import to_onnx
@@ -43,12 +43,7 @@ NEAR_M = 0.1
 class Cut:
     """A short section of the sample, with the weights for it.
 
-    Attributes
-    ----------
-    points : RailPoints
-    parameters : Parameters
-        Without thinning, which may keep different vertices of the same curve.
-    arrays : dict
+    Lines are not thinned, which may keep different vertices of the same curve.
     """
 
     points: RailPoints
@@ -73,18 +68,7 @@ def open_vino(
 ) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
     """Return a function that runs the first pass on OpenVINO, with as many threads as PyTorch has.
 
-    Parameters
-    ----------
-    arrays : dict
-        Weights.
-    number_type : {"float32", "bfloat16"}
-    height, width : int
-        Size of the raster.
-
-    Returns
-    -------
-    callable
-        From raster and state to probabilities.
+    It gives probabilities from raster and state, in float32 or bfloat16.
     """
     from openvino import Core
 
@@ -99,19 +83,11 @@ def open_vino(
 
 
 def speed_table(cut: Cut, rounds: int, clock: Callable[[], float]) -> Iterable[str]:
-    """Time the first pass, with the variants in turn, and yield the medians of seconds per megacell.
-
-    Parameters
-    ----------
-    cut : Cut
-    rounds : int
-    clock : callable
-        Returns seconds.
-    """
+    """Time the first pass, with the variants in turn, and yield the medians of seconds per megacell."""
     raster = cut.raster
-    (field,) = lay_fields(raster, 1 << 40)
+    (field,) = lay_batches(raster, 1 << 40)
     row, column = raster.cells().min(axis=0)
-    whole = Piece(int(row), int(column), TILE, TILE)
+    whole = Rectangle(int(row), int(column), TILE, TILE)
     tile = raster.read(*whole.window).astype(np.float32)
     seen = [raster.read(*piece.window).astype(np.float32) for piece in field.pieces]
     network, exact = plain_network(cut.arrays), TorchEngine(cut.arrays, "CPU", exact=True)
@@ -158,7 +134,7 @@ def cells_table() -> Iterable[str]:
     raster = rasterize(np.concatenate([along + offset * across for offset in (0.0, 1.5, 4.0, 5.5)]), CELL_M)
     cells = raster.cells()
     height, width = (cells.max(axis=0) + 1 - cells.min(axis=0)).tolist()
-    fields = lay_fields(raster, TorchEngine.max_cells)
+    fields = lay_batches(raster, TorchEngine.max_cells)
     computed = sum(piece.height * piece.width for field in fields for piece in field.pieces)
     yield (
         f"Cells computed for {DIAGONAL_M / 1000:g} km of double track on the diagonal:"
@@ -176,7 +152,7 @@ def changes_table(cut: Cut) -> Iterable[str]:
     exact.max_cells = SMALL_FIELD
     rows = {
         "pieces along the track": (pieces, plain),
-        f"{len(lay_fields(raster, SMALL_FIELD))} fields instead of one": (clean(raster, exact), pieces),
+        f"{len(lay_batches(raster, SMALL_FIELD))} fields instead of one": (clean(raster, exact), pieces),
         f"{_number_type(fast)} instead of float32": (quick, pieces),
         "OpenCV instead of PyTorch": (clean(raster, OpenCvEngine(cut.arrays)), pieces),
         "all shortcuts of AUTO": (quick, plain),
@@ -192,7 +168,7 @@ def _eager(network: FRPDF, tile: np.ndarray) -> None:
         torch.sigmoid(network.logits(seen, torch.full_like(seen, START), 0)).numpy()
 
 
-def _sweep(engine: Engine, seen: Sequence[np.ndarray], pieces: Sequence[Piece]) -> None:
+def _sweep(engine: Engine, seen: Sequence[np.ndarray], pieces: Sequence[Rectangle]) -> None:
     engine.sweep(seen, [_start(one) for one in seen], 0, pieces, SILENT)
 
 

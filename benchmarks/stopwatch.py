@@ -12,13 +12,7 @@ from typing import Any
 
 
 class Stopwatch:
-    """Sums up processor time by stage.
-
-    Attributes
-    ----------
-    spent_s : Counter of str
-        Seconds of each stage.
-    """
+    """Sums up processor time, seconds, by stage."""
 
     def __init__(self, clock: Callable[[], float] = time.process_time) -> None:
         self.spent_s: Counter[str] = Counter()

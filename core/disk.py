@@ -2,7 +2,7 @@
 
 Whenever a run is interrupted, the old file or the new one is there, never part of each. A shapefile consists of several
 files: between the old set and the new one there is a moment without the file that opens the set, and the next run that
-writes to the folder completes an interrupted move.
+writes to the folder completes an interrupted move. Temporary folders that killed runs have left are removed.
 """
 
 from __future__ import annotations
@@ -10,17 +10,35 @@ from __future__ import annotations
 import errno
 import json
 import os
+import platform
+import re
+import secrets
 import shutil
 import stat
+import sys
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
 from .errors import DiskError
-from .scratch import lock, scratch_folder, sweep
+
+PREFIX = ".rail_extract_"
+NAME = re.compile(re.escape(PREFIX) + "[0-9a-f]{12}")
+
+MARK = "in_use"
+"""File in a temporary folder that its process keeps locked; it holds the name of the computer."""
+
+MIN_AGE_S = 60.0
+"""Younger folders are not removed: their process may not have locked them yet."""
+
+MIN_UNMARKED_AGE_S = 86_400.0
+"""The same for folders whose process was killed before it had marked them."""
+
+OWNER_ONLY = 0o777 if sys.platform == "win32" else 0o700
+"""Rights of a temporary folder. On Windows, files that are moved keep the rights of the folder they come from."""
 
 LOGS = ("-wal", "-journal")
 """Suffixes, added to a GeoPackage's name, of files with changes that are not yet in it."""
@@ -46,13 +64,81 @@ tries. Then it continues: anybody who can read a folder can lock it."""
 
 
 @contextmanager
-def writing(folder: Path) -> Iterator[None]:
-    """Turn an `OSError` while writing into a folder into one sentence.
+def scratch_folder(parent: Path) -> Iterator[Path]:
+    """Create a folder in another one that no other process knows or uses, and delete it in any case.
 
-    Raises
-    ------
-    DiskError
+    Its name is unpredictable, and creating it fails if anything has this name, so that nobody can direct the files
+    elsewhere with a symbolic link.
     """
+    folder = parent / f"{PREFIX}{secrets.token_hex(6)}"
+    folder.mkdir(OWNER_ONLY)
+    try:
+        computer = platform.node()
+        with (folder / MARK).open("x", encoding="utf-8") as mark:
+            mark.write(computer)
+            mark.flush()
+            with suppress(OSError):  # on a drive without locks, no folder is ever taken for abandoned
+                lock(mark.fileno())
+            yield folder
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def sweep(parent: Path, rescue: Callable[[Path], None] | None = None) -> None:
+    """Remove the temporary folders that killed processes of this user have left; `rescue` gets each of them before."""
+    with suppress(OSError):
+        for entry in os.scandir(parent):
+            if NAME.fullmatch(entry.name) and entry.is_dir(follow_symlinks=False) and _is_abandoned(Path(entry)):
+                if rescue is not None:
+                    rescue(Path(entry))
+                shutil.rmtree(entry, ignore_errors=True)
+
+
+def discard(path: Path) -> None:
+    """Delete whatever has a name, a folder with all its content."""
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path)
+    else:
+        path.unlink(missing_ok=True)
+
+
+def _is_abandoned(folder: Path) -> bool:
+    """Return whether a folder belongs to this user and the process that created it on this computer is gone."""
+    mark, now = folder / MARK, time.time()
+    try:
+        state = folder.stat()
+        if hasattr(os, "getuid") and state.st_uid != os.getuid():
+            return False
+        if not mark.exists() or not mark.stat().st_size:
+            return now - state.st_mtime > MIN_UNMARKED_AGE_S
+        with mark.open("r+", encoding="utf-8") as opened:
+            if opened.read() != platform.node() or now - mark.stat().st_mtime < MIN_AGE_S:
+                return False
+            lock(opened.fileno())
+            return True
+    except (OSError, UnicodeDecodeError):
+        return False
+
+
+if sys.platform == "win32":
+    import msvcrt
+
+    def lock(number: int) -> None:
+        """Lock an open file, given by its number, until it is closed; `OSError` if another process has locked it."""
+        os.lseek(number, 0, os.SEEK_SET)
+        msvcrt.locking(number, msvcrt.LK_NBLCK, 1)
+
+else:
+    import fcntl
+
+    def lock(number: int) -> None:
+        """Lock an open file, given by its number, until it is closed; `OSError` if another process has locked it."""
+        fcntl.flock(number, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
+@contextmanager
+def writing(folder: Path) -> Iterator[None]:
+    """Turn an `OSError` while writing into a folder into one sentence, that of a DiskError."""
     try:
         yield
     except OSError as error:
@@ -63,12 +149,7 @@ def writing(folder: Path) -> Iterator[None]:
 
 
 def check_closed(path: Path) -> None:
-    """Refuse to replace a GeoPackage that another program is writing to: its pending changes would damage the new file.
-
-    Raises
-    ------
-    DiskError
-    """
+    """Refuse to replace a GeoPackage that another program is writing to: pending changes would damage the new file."""
     for log in (path.with_name(path.name + end) for end in LOGS):
         if log.exists() and log.stat().st_size:
             raise DiskError(
@@ -80,16 +161,8 @@ def check_closed(path: Path) -> None:
 class Destination:
     """A file that a run will write, and the file that was there when the run began.
 
-    Several outputs that go into one file share one destination.
-
-    Attributes
-    ----------
-    path : Path
-        As the user named it.
-    file : Path
-        The file itself, if `path` is a symbolic link.
-    before : tuple of int or None
-        Identity of the file that this run found, or has written.
+    Several outputs that go into one file share one destination. `path` is as the user named it, `file` the file itself
+    if that is a symbolic link, and `before` the identity of the file that this run found, or has written.
     """
 
     path: Path
@@ -100,11 +173,8 @@ class Destination:
     def at(cls, path: Path) -> Destination:
         """Check that a file can be written, as far as that can be known before, and remember the old one.
 
-        Raises
-        ------
-        DiskError
-            Its folder or the old file is not writable, something other than a file has this name, or the old file is
-            open in another program.
+        Raises DiskError if its folder or the old file is not writable, something other than a file has this name, or
+        the old file is open in another program.
         """
         try:
             file = Path(os.path.realpath(path))
@@ -119,22 +189,12 @@ class Destination:
     def replacing(self, edit: bool = False) -> Iterator[Path]:
         """Move a file, and all files that are written next to it, to their names when the block ends without an error.
 
-        Parameters
-        ----------
-        edit : bool
-            Whether to begin with a copy of the old file, or of the files of a shapefile.
+        Yields the name in a temporary folder under which to write the file; with `edit`, it begins with a copy of the
+        old file, or of the files of a shapefile. An `OSError` in the block becomes a `DiskError`; one that states only
+        a text may stand for the error of a library.
 
-        Yields
-        ------
-        Path
-            The name in a temporary folder under which to write the file. An `OSError` in the block becomes a
-            `DiskError`; one that states only a text may stand for the error of a library.
-
-        Raises
-        ------
-        DiskError
-            The disk is full, the old file is open elsewhere, or another run has replaced it in the meantime. The old
-            file is then kept, and the new files are left next to it with `_new` in their names.
+        Raises DiskError if the disk is full, the old file is open elsewhere, or another run has replaced it in the
+        meantime. The old file is then kept, and the new files are left next to it with `_new` in their names.
         """
         try:
             with scratch_folder(self.file.parent) as folder:
@@ -151,13 +211,7 @@ class Destination:
             raise _unwritable(self.path, error) from error
 
     def write_text(self, text: str) -> None:
-        """Write a text file.
-
-        Raises
-        ------
-        DiskError
-            See `replacing`.
-        """
+        """Write a text file, as in `replacing`."""
         with self.replacing() as new:
             new.write_text(text, encoding="utf-8")
 
@@ -193,12 +247,8 @@ class Destination:
 def replace_folder(scratch: Path, target: Path) -> None:
     """Move a new folder, in the folder `NEW` of a temporary one, to its name next to it, where an old one may be.
 
-    If the run is killed in between, the next one that writes there completes it.
-
-    Raises
-    ------
-    OSError
-        It can't be moved. The old folder is in its place again.
+    If the run is killed in between, the next one that writes there completes it. After an OSError, the old folder is in
+    its place again.
     """
     new, old = scratch / NEW / target.name, scratch / OLD / target.name
     old.parent.mkdir()
@@ -261,12 +311,7 @@ def _swap(folder: Path, main: Path, names: Sequence[Path]) -> None:
 
     If there are several new files, the main one, which opens the set, is missing from the first move to the last: a set
     that is not complete cannot be opened. Files of `names` that are no longer in the temporary folder have been moved
-    already.
-
-    Raises
-    ------
-    OSError
-        A file can't be replaced because it is open elsewhere. All old files are in their places again.
+    already. After an OSError, as of a file that is open elsewhere, all old files are in their places again.
     """
     new, old = folder / NEW, folder / OLD
     waiting = [name for name in names if (new / name.name).exists()]

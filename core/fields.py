@@ -399,18 +399,10 @@ WIRE_FIELDS = (
 
 @dataclass(frozen=True)
 class Product:
-    """A kind of layer.
+    """A kind of layer, with lines as features, or else points.
 
-    Attributes
-    ----------
-    style : str
-        Name of the style that QGIS gives it.
-    drawn : str
-        First word of its layers in a drawing.
-    is_line : bool
-        Whether its features are lines; else they are points.
-    layer : str
-        Its name in the GeoPackages of the commands; that of the style if empty.
+    `style` is the name of the style that QGIS gives it, `drawn` the first word of its layers in a drawing, and `layer`
+    its name in the GeoPackages of the commands; that of the style if empty.
     """
 
     style: str

@@ -118,13 +118,7 @@ def pytorch() -> Library:
 
 
 def device_of(device: str) -> str:
-    """Return PyTorch's name of a device: with AUTO, that of a graphics card if there is one.
-
-    Raises
-    ------
-    ModelError
-        There is no CUDA device.
-    """
+    """Return PyTorch's name of a device: with AUTO, that of a graphics card if there is one; may raise ModelError."""
     import torch
 
     if device == "CUDA" and not torch.cuda.is_available():

@@ -51,8 +51,6 @@ class Parameters:
         Distance between the inner faces of the two railheads, and width of a railhead.
     passes : int
         Passes of the network; 0 runs until the result is stable.
-    engine, device : str
-        See `frpdf.engine`.
     model : str
         Name of a model, see `frpdf.models`.
     smoothing_xy_m : float

@@ -58,14 +58,10 @@ def length_along(vertices: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Polyline:
-    """A line with chainages; all that is computed along it is in plan.
+    """A line, `xyz` (n, 2) or (n, 3) metres, with chainages; all that is computed along it is in plan.
 
-    Attributes
-    ----------
-    xyz : (n, 2) or (n, 3) array
-        Vertices, metres.
-    given : (n,) array or None
-        Chainages of the vertices, rising, where they are those of another line; None for the distance from the first.
+    `given`, (n,), are rising chainages of the vertices where they are those of another line; None for the distance from
+    the first.
 
     Examples
     --------
@@ -187,16 +183,10 @@ def distance_to(t: np.ndarray, stations: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Feet:
-    """Feet of points: their perpendicular projections onto the nearest of several lines.
+    """Feet of points: their perpendicular projections onto the nearest of several lines, (n,) each.
 
-    Attributes
-    ----------
-    point, line : (n,) int arrays
-        Indices of the points and of the lines; sorted by line, then by `t`.
-    t : (n,) array
-        Chainage of the foot in metres.
-    across : (n,) array
-        Distance of the point from its foot in metres, positive to the left of the line.
+    `point` and `line` are numbers; feet are sorted by line, then by the chainage `t`, metres. `across` is the distance
+    of the point from its foot in metres, positive to the left of the line.
     """
 
     point: np.ndarray
@@ -227,14 +217,8 @@ def project(lines: Sequence[np.ndarray], xy: np.ndarray, reach_m: float, progres
 class Chords:
     """Lines cut into short chords, in search trees.
 
-    Attributes
-    ----------
-    xyz : (n, d) array
-        Places on the lines, one line after the other, from each of which a chord leads to the next.
-    line : (n,) int array
-        Number of the line of each place.
-    t : (n,) array
-        Chainage of each place.
+    `xyz`, (n, d), are places on the lines, one line after the other, from each of which a chord leads to the next;
+    number of the line and chainage of each are (n,).
     """
 
     xyz: np.ndarray
@@ -365,25 +349,10 @@ class Chords:
     def meet(
         self, stations: np.ndarray, directions: np.ndarray, expected_m: float, max_offset_m: float
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Find the lines in given directions from stations.
+        """Find the lines in given directions, unit vectors (k, 2), from stations, (k, 2).
 
-        Parameters
-        ----------
-        stations, directions : (k, 2) arrays
-            Places, and unit vectors.
-        expected_m : float
-            Expected distance of the line.
-        max_offset_m : float
-            Maximum deviation from the expected place.
-
-        Returns
-        -------
-        place : (k,) int array
-            Place on a line that is nearest to the expected one.
-        xyz : (k, d) array
-            Where the line is met; NaN where none is.
-        t : (k,) array
-            Chainage there.
+        A line is expected at `expected_m`, give or take `max_offset_m`. Returns the place on a line that is nearest to
+        the expected one, (k,), where the line is met, (k, d), NaN where none is, and the chainage there, (k,).
         """
         off, nearest = self._places.query(stations + expected_m * directions, distance_upper_bound=max_offset_m)
         nearest = np.where(np.isfinite(off), nearest, 0)

@@ -84,7 +84,6 @@ class Progress:
 
         Parameters
         ----------
-        items : iterable
         total : int, optional
             Number of items, if `items` does not know it.
         """
@@ -170,17 +169,10 @@ class Recording(_Relay):
 
 
 class Estimating(_Relay):
-    """Passes everything on, and reports the remaining time, estimated from the second half of the elapsed time.
+    """Passes everything on to a listener, and reports the remaining time, estimated from the second half of the time.
 
     A status begins an activity with a speed of its own: the time before it, such as that of an import, does not count.
-    Nothing is reported while files are read, and until the time is known to a factor of two.
-
-    Parameters
-    ----------
-    listener : Progress
-        Receives the reports.
-    clock : callable
-        Returns the time in seconds.
+    Nothing is reported while files are read, and until the time is known to a factor of two. `clock` returns seconds.
     """
 
     def __init__(self, listener: Progress, clock: Callable[[], float] = time.monotonic) -> None:

@@ -41,19 +41,10 @@ def cell_size(gauge_m: float, head_width_m: float) -> float:
 
 @dataclass(frozen=True)
 class RailRaster:
-    """Rail cells on a square grid, stored by tile.
+    """Rail cells on a square grid, stored by tile, (TILE, TILE) bool arrays by tile row and column.
 
-    Row numbers grow to the south, column numbers to the east; both may be negative. Cell (0, 0) has its north-west
-    corner at (`x0`, `y0`).
-
-    Attributes
-    ----------
-    tiles : mapping of (tile row, tile column) to (TILE, TILE) bool array
-        Missing tiles contain no rail cell.
-    cell_m : float
-        Side of a cell in metres.
-    x0, y0 : float
-        North-west corner of cell (0, 0) in local metres.
+    Missing tiles contain no rail cell. Row numbers grow to the south, column numbers to the east; both may be negative.
+    Cell (0, 0), of side `cell_m`, has its north-west corner at (`x0`, `y0`), local metres.
     """
 
     tiles: Mapping[tuple[int, int], np.ndarray]
@@ -78,12 +69,7 @@ class RailRaster:
         return window
 
     def cells(self) -> np.ndarray:
-        """Return rows and columns of all rail cells, sorted by tile.
-
-        Returns
-        -------
-        (n, 2) int64 array
-        """
+        """Return rows and columns of all rail cells, (n, 2), sorted by tile."""
         found = [
             np.argwhere(tile) + np.array(index, dtype=np.int64) * TILE for index, tile in sorted(self.tiles.items())
         ]

@@ -38,18 +38,10 @@ HEAD_WIDTH_RANGE_MM = (40.0, 90.0)
 
 @dataclass(frozen=True)
 class RailStandard:
-    """A rail profile on a gauge.
+    """A rail profile on a gauge, known by its name, a key of `STANDARDS` that never changes, or CUSTOM.
 
-    Attributes
-    ----------
-    name : str
-        Key of `STANDARDS`, or CUSTOM. Keys never change.
-    label : str
-        Name to show to users.
-    region : str
-        Where the profile is laid; empty for CUSTOM.
-    sources : str
-        Letters of `SOURCES` that confirm the width of the head; empty if none does.
+    `label` is shown to users, and `region` is where the profile is laid. `sources` has the letters of `SOURCES` that
+    confirm the width of the head; empty if none does.
     """
 
     name: str
@@ -168,17 +160,10 @@ STANDARDS = _standards()
 
 
 def resolve(name: str, gauge_mm: float | None = None, head_width_mm: float | None = None) -> RailStandard:
-    """Look up a standard; a gauge or a head width, if given, overrides that of the standard.
+    """Look up a standard; a gauge or a head width, if given, overrides that of the standard, and CUSTOM needs both.
 
-    Parameters
-    ----------
-    name : str
-        A key of `STANDARDS`, or CUSTOM, which needs both numbers.
-
-    Raises
-    ------
-    ParameterError
-        The name is unknown, a number is missing for CUSTOM, or a number is outside the range of railways.
+    Raises ParameterError if the name is unknown, a number is missing for CUSTOM, or a number is outside the range of
+    railways.
 
     Examples
     --------
@@ -212,19 +197,11 @@ def resolve(name: str, gauge_mm: float | None = None, head_width_mm: float | Non
 
 
 def closest_standard(spacing_m: float, head_width_m: float) -> RailStandard | None:
-    """Find the standard that fits rails as they were measured.
+    """Find the standard that fits rails as they were measured: `spacing_m` is the distance between their axes.
 
-    Parameters
-    ----------
-    spacing_m : float
-        Distance between the axes of the two rails.
-
-    Returns
-    -------
-    RailStandard or None
-        None if no standard has such a gauge, nor rails as far apart: heads in blunt clouds, or more than heads in a
-        class, look wider than they are, and the distance is right nevertheless. The usual profile of a gauge stands
-        for the others then.
+    None if no standard has such a gauge, nor rails as far apart: heads in blunt clouds, or more than heads in a class,
+    look wider than they are, and the distance is right nevertheless. The usual profile of a gauge stands for the others
+    then.
 
     Examples
     --------
@@ -272,19 +249,8 @@ def read_gauges(
 ) -> tuple[Gauge, ...]:
     """Read the gauges that tracks may have: that of the standard, and those of a text such as "1000/66;1067".
 
-    Parameters
-    ----------
-    text : str
-        Millimetres. The width of the railhead may follow a gauge; it is that of the standard otherwise.
-    what : str
-        Name of the parameter or option, for the error.
-    has_parameter : bool
-        See `distinct_gauges`.
-
-    Raises
-    ------
-    ParameterError
-        The text is something else, a number is outside the range of railways, or gauges can't be distinguished.
+    The width of the railhead, millimetres like the gauge, may follow it; it is that of the standard otherwise. `what`
+    names the parameter or option, for the ParameterError; `has_parameter` as in `distinct_gauges`.
 
     Examples
     --------
@@ -317,18 +283,9 @@ _PAIR = re.compile(r"\d+(\.\d+)?(/\d+(\.\d+)?)?")
 def distinct_gauges(gauges_m: Sequence[float], tolerance_m: float, has_parameter: bool = True) -> tuple[float, ...]:
     """Return the gauges to pair rails by, without repetitions.
 
-    Parameters
-    ----------
-    tolerance_m : float
-        Largest deviation of a track from its gauge.
-    has_parameter : bool
-        Whether the user can choose the tolerance.
-
-    Raises
-    ------
-    ParameterError
-        A gauge is outside the range of railways, or two differ by less than the tolerance: tracks would be found
-        twice.
+    `tolerance_m` is the largest deviation of a track from its gauge; `has_parameter` says whether the user can choose
+    it. Raises ParameterError if a gauge is outside the range of railways, or two differ by less than the tolerance:
+    tracks would be found twice.
     """
     distinct = tuple(dict.fromkeys(gauges_m))
     for gauge_m in distinct:

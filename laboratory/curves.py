@@ -10,14 +10,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Element:
-    """A section of track whose curvature changes linearly from `start` to `end`: straight, arc or clothoid.
-
-    Attributes
-    ----------
-    length_m : float
-    start, end : float
-        Curvature in 1/m, positive to the left.
-    """
+    """A section of track whose curvature, 1/m and positive to the left, changes linearly: straight, arc or clothoid."""
 
     length_m: float
     start: float = 0.0
@@ -26,17 +19,10 @@ class Element:
 
 @dataclass(frozen=True)
 class Curve:
-    """A curve, sampled at equal steps along its length.
+    """A curve, (n, 2) metres, sampled at equal steps along its length.
 
-    Attributes
-    ----------
-    xy : (n, 2) array
-        Metres.
-    heading : (n,) array
-        Radians, counterclockwise from the x axis.
-    curvature : (n,) array
-        1/m, positive to the left.
-    step_m : float
+    The heading is in radians counterclockwise from the x axis, the curvature in 1/m and positive to the left, (n,)
+    each.
     """
 
     xy: np.ndarray
@@ -80,24 +66,11 @@ def trace(
     heading: float = 0.0,
     step_m: float = 0.02,
 ) -> Curve:
-    """Compute the curve of a chain of elements.
+    """Compute the curve of a chain of elements from a start, metres, in a direction, radians.
 
     Because the curvature is piecewise linear, the heading is integrated exactly. The position is integrated by
     Simpson's rule on half steps: at steps of 2 cm and railway radii the error is below one micrometre per kilometre.
-
-    Parameters
-    ----------
-    elements : sequence of Element
-    start : tuple of float
-        x and y of the first point, metres.
-    heading : float
-        Direction at the first point, radians.
-    step_m : float
-        Distance between samples; the last element is shortened to a whole number of steps.
-
-    Returns
-    -------
-    Curve
+    The last element is shortened to a whole number of steps.
     """
     borders = np.concatenate([[0.0], np.cumsum([element.length_m for element in elements])])
     count = int(borders[-1] / step_m + 1e-9)
@@ -116,20 +89,9 @@ def trace(
 
 
 def transition_curve(straight_m: float, clothoid_m: float, arc_m: float, curvature: float) -> list[Element]:
-    """Return the elements of the classical railway curve (docs/synthetic.md).
+    """Return straight, clothoid, arc, clothoid and straight: the classical railway curve (docs/synthetic.md).
 
-    Parameters
-    ----------
-    straight_m, clothoid_m : float
-        Length of each of the two straights and of the two clothoids.
-    arc_m : float
-    curvature : float
-        Of the arc, 1/m, positive to the left.
-
-    Returns
-    -------
-    list of Element
-        Straight, clothoid, arc, clothoid, straight.
+    The curvature of the arc is in 1/m and positive to the left.
     """
     return [
         Element(straight_m),

@@ -9,7 +9,7 @@ from typing import Optional
 import numpy as np
 
 from ..core.alignment.elements import Alignment, CantElement, VerticalElement, chained
-from ..core.alignment.held import noted
+from ..core.alignment.layouts import noted
 from ..core.alignment.measured import Track
 from ..core.frame import LocalFrame
 from ..core.parameters import CLOTHOIDS, FitParameters
@@ -157,16 +157,8 @@ def surveyed(
 ) -> np.ndarray:
     """Return vertices of a line along a design, (n, 3) metres, with errors across and in height.
 
-    Parameters
-    ----------
-    design : Alignment
-    random : Generator
-    white_m : float
-        Standard deviation of errors that are independent from vertex to vertex, metres.
-    misaligned_m, correlation_m : float
-        Standard deviation of the misalignment, and the distance at which its correlation has fallen to 1/e, metres.
-    step_m : float
-        Distance between the vertices.
+    `white_m` is the standard deviation of errors that are independent from vertex to vertex, `misaligned_m` that of the
+    misalignment, whose correlation falls to 1/e over `correlation_m`.
     """
     s = np.arange(design.s_from, design.s_to + 1e-9, step_m)
     heading = design.headings(s)
@@ -195,16 +187,7 @@ def with_cant(design: Alignment, line: np.ndarray, random: np.random.Generator) 
 
 @dataclass(frozen=True)
 class TrackScene:
-    """A design, the track that was measured of it, and how it is fitted.
-
-    Attributes
-    ----------
-    design : Alignment
-    track : Track
-    settings : FitParameters
-    fixed : Alignment, optional
-        Elements whose types are given.
-    """
+    """A design, the track that was measured of it, and how it is fitted; elements of `fixed` have given types."""
 
     design: Alignment
     track: Track

@@ -27,15 +27,7 @@ decimals."""
 
 
 def field(name: str, kind, decimals: int = 0) -> QgsField:
-    """Define a field.
-
-    Parameters
-    ----------
-    name : str
-    kind
-        `INTEGER`, `REAL` or `TEXT`.
-    decimals : int
-    """
+    """Define a field of the kind `INTEGER`, `REAL` or `TEXT`."""
     return QgsField(name, kind, "", DIGITS if decimals else 0, decimals)
 
 

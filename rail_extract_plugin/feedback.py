@@ -14,11 +14,7 @@ from .notices import notices
 class QgisProgress(Progress):
     """Passes reports of the core to a QGIS feedback, and the state of its Cancel button back.
 
-    Parameters
-    ----------
-    feedback : QgsProcessingFeedback
-    definitions : sequence of QgsProcessingParameterDefinition
-        Parameters whose names may occur in messages.
+    Messages may name parameters of these definitions.
     """
 
     def __init__(
@@ -53,12 +49,7 @@ class QgisProgress(Progress):
 
 
 class TaskProgress(Progress):
-    """Shows the progress of a background task in QGIS's status bar.
-
-    Parameters
-    ----------
-    task : QgsTask
-    """
+    """Shows the progress of a background task in QGIS's status bar."""
 
     def __init__(self, task: QgsTask) -> None:
         self._task = task

@@ -49,12 +49,7 @@ links = _Links()
 
 
 class LinkFollower(QObject):
-    """Follows the links of a log that is clicked; the log of QGIS 3.22 does not follow any.
-
-    Parameters
-    ----------
-    log : QTextEdit
-    """
+    """Follows the links of a log that is clicked; the log of QGIS 3.22 does not follow any."""
 
     def __init__(self, log: QTextEdit) -> None:
         super().__init__(log)

@@ -16,13 +16,7 @@ if TYPE_CHECKING:
 
 
 class RailExtractPlugin:
-    """Life cycle of the plugin.
-
-    Parameters
-    ----------
-    iface : qgis.gui.QgisInterface or None
-        None under ``qgis_process``.
-    """
+    """Life cycle of the plugin; under ``qgis_process``, QGIS has no interface."""
 
     def __init__(self, iface) -> None:
         self.iface = iface

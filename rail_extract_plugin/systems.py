@@ -18,10 +18,7 @@ _built: dict[str, QgsCoordinateReferenceSystem] = {}
 def prepare_system(wkt: str | None) -> None:
     """Build the coordinate system of a run's inputs and results; to be called in the main thread.
 
-    Parameters
-    ----------
-    wkt : str or None
-        None for coordinates in metres in an unknown system.
+    None stands for coordinates in metres in an unknown system.
     """
     from ..core.clouds.crs import parse_crs
 

@@ -10,13 +10,7 @@ EXTRACT_RAILS = "railextract:extractrails"
 
 
 class ToolboxAction(ContextAction):
-    """An entry that appears on Extract Rails; a subclass opens something in `execute`.
-
-    Parameters
-    ----------
-    name : str
-        Text of the entry.
-    """
+    """An entry that appears on Extract Rails; a subclass opens something in `execute`."""
 
     def __init__(self, name: str) -> None:
         super().__init__()

@@ -16,13 +16,7 @@ ROOM = 1.5
 
 
 def show_in_3d(iface: Any) -> None:
-    """Open a 3D map view above the lines of the selected layer, with its ground below them.
-
-    Parameters
-    ----------
-    iface : qgis.gui.QgisInterface
-        Of a QGIS that `compat.OPENS_3D_VIEWS`.
-    """
+    """Open a 3D map view above the lines of the selected layer, with its ground below, if `compat.OPENS_3D_VIEWS`."""
     layer = iface.activeLayer()
     heights = _heights(layer) if isinstance(layer, QgsVectorLayer) else []
     if not heights:

@@ -23,13 +23,7 @@ INSTALL, SAMPLE = "packages", "sample"
 
 
 class Welcome(QObject):
-    """Leads to the missing packages, and once there are none, to the sample; each is shown once.
-
-    Parameters
-    ----------
-    bar : QgsMessageBar
-    open_sample : callable
-    """
+    """Leads to the missing packages, and once there are none, to the sample; each is shown once."""
 
     def __init__(self, bar: QgsMessageBar, open_sample: Callable[[], None]) -> None:
         super().__init__()

@@ -43,10 +43,7 @@ TOOLBOX = "ProcessingToolbox"
 class Windows(QObject):
     """Adds everything when it is made, and takes it away with `remove`.
 
-    Parameters
-    ----------
-    iface : qgis.gui.QgisInterface or None
-        None in tests without QGIS's main window, which get no menu and no dock.
+    In tests without QGIS's main window there is no interface, and no menu and no dock.
     """
 
     def __init__(self, iface) -> None:

@@ -56,16 +56,7 @@ GREY, RAIL, OTHER, DROPPED = "#9e9e9e", "#1565c0", "#f28e2b", "#e64a19"
 class Scene:
     """A raw cloud with what the first steps make of it.
 
-    Attributes
-    ----------
-    raw : RawScene
-    settings : Settings
-    height : (n,) array
-        Above the bed.
-    tops : Tops
-    marks : (k,) int array
-        Narrow cells, one of each block.
-    kept : square.Kept
+    Heights are above the bed; marks are narrow cells, one of each block.
     """
 
     raw: RawScene

@@ -25,15 +25,7 @@ the code; [method.md](../docs/method.md) explains the steps in which the numbers
 
 @dataclass(frozen=True)
 class Group:
-    """Constants that share a docstring.
-
-    Attributes
-    ----------
-    names, values : tuple of str
-        As the code writes them.
-    meaning : str
-        The docstring on one line; empty without one.
-    """
+    """Constants that share a docstring, as the code writes them, and its text on one line, empty without one."""
 
     names: tuple[str, ...]
     values: tuple[str, ...]

@@ -59,14 +59,7 @@ def extract() -> dict:
 
 
 def row(name: str, length_m: float, result: Comparison) -> str:
-    """Return a row of the table.
-
-    Parameters
-    ----------
-    name : str
-    length_m : float
-    result : Comparison
-    """
+    """Return a row of the table."""
     return (
         f"{name:12}{result.line_count:6}{result.truth_count:6}{length_m:8.1f} m"
         f"{result.completeness:8.1%} {result.correctness:8.1%} {result.lateral_rmse_m * 1000:10.1f} mm"
@@ -75,17 +68,7 @@ def row(name: str, length_m: float, result: Comparison) -> str:
 
 
 def draw_map(cloud: Path, rails: Sequence[np.ndarray], centerlines: Sequence[np.ndarray], picture: Path) -> None:
-    """Draw the whole scene, a detail and the heights along the tracks.
-
-    Parameters
-    ----------
-    cloud : Path
-        File of the rail points.
-    rails, centerlines : sequence of (n, 3) array
-        In the coordinates of the cloud.
-    picture : Path
-        PNG to write.
-    """
+    """Draw the whole scene, a detail and the heights along the tracks as PNG; lines have the cloud's coordinates."""
     (points,) = read_rail_points(cloud, (RAIL_CLASS,))
     frame = points.frame
     rails, centerlines = [[frame.to_local(line) for line in lines] for lines in (rails, centerlines)]

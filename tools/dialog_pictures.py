@@ -23,19 +23,10 @@ PROVIDER = "railextract"
 
 
 def dialog_pictures(folder: Path, filled: Mapping[str, Mapping[str, Any]] | None = None) -> tuple[Path, ...]:
-    """Write pictures of every dialog of the plugin, which must be registered in a QGIS with widgets.
+    """Write and return pictures of every dialog of the plugin, which must be registered in a QGIS with widgets.
 
-    Parameters
-    ----------
-    folder : Path
-        Folder for ALGORITHM_SIZE.png, for each of `SIZES`, and ALGORITHM_all.png with all fields.
-    filled : mapping, optional
-        Values instead of the defaults, by parameter, by algorithm.
-
-    Returns
-    -------
-    tuple of Path
-        The pictures.
+    They are ALGORITHM_SIZE.png, for each of `SIZES`, and ALGORITHM_all.png with all fields; `filled` has values instead
+    of the defaults, by parameter, by algorithm.
     """
     folder.mkdir(parents=True, exist_ok=True)
     algorithms = QgsApplication.processingRegistry().providerById(PROVIDER).algorithms()

@@ -13,13 +13,7 @@ BUILD = ROOT / "build"
 
 
 def environment() -> dict[str, str]:
-    """Return the variables that qgis_process needs, by name.
-
-    Raises
-    ------
-    SystemExit
-        There is no qgis_process.
-    """
+    """Return the variables that qgis_process needs, by name; raises SystemExit without one."""
     # The wrapper in Debian 12 passes an option that its program refuses.
     qgis_process = shutil.which("qgis_process.bin") or shutil.which("qgis_process")
     if qgis_process is None:

@@ -20,20 +20,9 @@ FINE = "gives the correct result"
 
 @dataclass(frozen=True)
 class Fault:
-    """A row of the page.
+    """A row of the page: how the run ends, some of its results, and what it says, where … stands for any text.
 
-    Attributes
-    ----------
-    name : str
-    ends : str
-        `REFUSED`, `WARNED` or `FINE`.
-    gives : dict
-        Some of the expected results.
-    says : str
-        The expected message; … stands for any text. Empty if there is none.
-    algorithm : str
-    prepare : callable
-        Creates the fault, given the fixture `bench`, and returns the parameters of the run.
+    `prepare` creates the fault, given the fixture `bench`, and returns the parameters of the run.
     """
 
     name: str
@@ -52,19 +41,9 @@ class Fault:
 
 
 def faults(title: str, makers: dict[str, dict[str, Callable[[Any], dict[str, Any]]]]) -> list[Fault]:
-    """Return the faults of a section of the page.
+    """Return the faults of a section of the page, from what makes each by algorithm and by the name of its row.
 
-    Parameters
-    ----------
-    title : str
-        Of the section.
-    makers : dict of dicts of callables
-        What makes the fault of each row, by algorithm and by the name of the row.
-
-    Raises
-    ------
-    ValueError
-        If a row has no maker, or a maker no row.
+    Raises ValueError if a row has no maker, or a maker no row.
     """
     found = {name: (algorithm, make) for algorithm, some in makers.items() for name, make in some.items()}
     rows = {name: rest for name, *rest in _rows(title)}

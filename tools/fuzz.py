@@ -147,21 +147,9 @@ def environment() -> dict[str, str]:
 
 
 def fuzz(kind: Kind, seeds: Iterable[int], until: float = float("inf")) -> tuple[Counter, dict[int, str]]:
-    """Read the damaged files of seeds until a time.
+    """Read the damaged files of seeds until a time of `time.monotonic`.
 
-    Parameters
-    ----------
-    kind : Kind
-    seeds : iterable of int
-    until : float
-        Time of `time.monotonic`.
-
-    Returns
-    -------
-    counts : Counter
-        Number of files by outcome.
-    failures : dict of int to str
-        What went wrong, by seed; each is also printed at once.
+    Returns the number of files by outcome, and what went wrong, by seed, which is also printed at once.
     """
     counts: Counter = Counter()
     failures: dict[int, str] = {}

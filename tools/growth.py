@@ -52,10 +52,7 @@ def write_track(path: Path) -> None:
 def run_once(cloud: Path, folder: Path) -> None:
     """Extract rails, tracks, stations, findings, report and cleaned raster into files.
 
-    Raises
-    ------
-    RuntimeError
-        The run failed, or found no rails.
+    Raises RuntimeError if the run failed, or found no rails.
     """
     algorithm = qgis().processingRegistry().createAlgorithmById("railextract:extractrails")
     suffixes = {"REPORT": "html", "CLEANED": "tif"}

@@ -29,17 +29,16 @@ from osgeo import gdal, ogr
 from qgis.core import QgsApplication, QgsProcessingContext
 from rail_extract.core.clouds.points import ask
 from rail_extract.core.clouds.readers import list_files
-from rail_extract.core.disk import Destination, identity
+from rail_extract.core.disk import MARK, MIN_UNMARKED_AGE_S, PREFIX, Destination, identity
 from rail_extract.core.fields import RAILS
 from rail_extract.core.files.layers import lines_layer
-from rail_extract.core.files.raster_file import header_for
+from rail_extract.core.files.rail_rasters import header_for
 from rail_extract.core.frame import LocalFrame
-from rail_extract.core.labelling.files import Choice, Labels, Output, write_labelled
+from rail_extract.core.labelling.files import Content, Labels, OutputFiles, write_labelled
 from rail_extract.core.progress import SILENT
 from rail_extract.core.rails import RailLine
 from rail_extract.core.raster import rasterize
 from rail_extract.core.run.loop import Runner
-from rail_extract.core.scratch import MARK, MIN_UNMARKED_AGE_S, PREFIX
 from rail_extract.core.standards import SEARCHED_CLASSES, resolve
 from rail_extract.rail_extract_plugin.algorithms import ALGORITHMS
 from rail_extract.rail_extract_plugin.dialog.parameter_values import ParameterValues
@@ -135,7 +134,7 @@ def read_page(path: Path) -> set[int]:
 
 def write_points(destination: Destination, version: int) -> None:
     """Write a classified copy in which the class of every point is the version."""
-    _write_copies([raw_tiles()[0]], Output(destination, (), None), version)
+    _write_copies([raw_tiles()[0]], OutputFiles(destination, (), None), version)
 
 
 def read_points(path: Path) -> set[int]:
@@ -146,7 +145,7 @@ def read_points(path: Path) -> set[int]:
 
 def write_tiles(destination: Destination, version: int) -> None:
     """Write classified copies of tiles, and their catalogue."""
-    output = Output(destination, tuple(tile.name for tile in raw_tiles()), None)
+    output = OutputFiles(destination, tuple(tile.name for tile in raw_tiles()), None)
     _write_copies(raw_tiles(), replace(output, before=identity(output.folder)), version)
 
 
@@ -170,13 +169,13 @@ def _write_tiles(folder: Path) -> None:
         cloud.write(folder / name)
 
 
-def _write_copies(tiles: list[Path], output: Output, version: int) -> None:
+def _write_copies(tiles: list[Path], output: OutputFiles, version: int) -> None:
     """Write the copies as Classify Rail Points does once it has found the rail points: here, all points."""
     request = ask(tiles, SEARCHED_CLASSES)
     with tempfile.TemporaryDirectory() as folder:
         labels = Labels(request, Path(folder))
         labels.add(np.arange(labels.point_count))
-        write_labelled(request, Choice(version % 200), labels, output, Runner(), SILENT)
+        write_labelled(request, Content(version % 200), labels, output, Runner(), SILENT)
 
 
 FORMATS: dict[str, tuple[str, Callable[[Destination, int], None], Callable[[Path], set[int]]]] = {
@@ -229,22 +228,9 @@ def elsewhere(call: Callable[[], set[int] | None]) -> set[int]:
 
 
 def kill_once(name: str, folder: Path, first: int, after_s: float) -> str:
-    """Write versions from `first` on in a process of its own, kill it, and return what is there.
+    """Write versions from `first` on in a process of its own, kill it after a time, and return what is there.
 
-    Parameters
-    ----------
-    name : str
-        Key of `FORMATS`.
-    folder : Path
-        Folder of the file, with the version before `first`.
-    first : int
-    after_s : float
-        Seconds from the first write to the kill.
-
-    Returns
-    -------
-    str
-        "whole", "absent until the next run" or what is wrong.
+    The folder has the version before `first`. What is there is "whole", "absent until the next run" or what is wrong.
     """
     file, write, read = FORMATS[name]
     reader, writer = os.pipe()

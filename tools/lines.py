@@ -11,21 +11,7 @@ ogr.UseExceptions()
 
 
 def read_features(path: Path, layer: str | None = None, where: str | None = None) -> list[tuple[np.ndarray, dict]]:
-    """Read the lines of a layer.
-
-    Parameters
-    ----------
-    path : Path
-    layer : str, optional
-        By default, the first layer.
-    where : str, optional
-        Filter as in SQL.
-
-    Returns
-    -------
-    list of ((n, 3) array, dict)
-        Vertices and attributes.
-    """
+    """Read vertices, (n, 3), and attributes of the lines of a layer, by default the first, filtered as in SQL."""
     source = ogr.Open(str(path))
     table = source.GetLayerByName(layer) if layer else source.GetLayer()
     table.SetAttributeFilter(where)

@@ -16,19 +16,10 @@ def layer_of(
     fields: str = "",
     values: Sequence[Sequence[Any]] = (),
 ) -> QgsVectorLayer:
-    """Make a layer in memory.
+    """Make a layer in memory, with a feature for each shape: WKT, vertices of a line, or nothing.
 
-    Parameters
-    ----------
-    shapes : str, QgsGeometry, (n, 2) or (n, 3) array, or None
-        One for each feature: WKT, vertices of a line, or nothing.
-    kind : str
-        The geometry type of QGIS; "None" for a table.
-    crs : str
-    fields : str
-        In the form of QGIS, such as `&field=km:double`.
-    values : sequence of sequences
-        Attributes of each feature.
+    Geometry type and fields are in the form of QGIS, such as "None" for a table and `&field=km:double`; values are rows
+    of attributes.
     """
     layer = QgsVectorLayer(f"{kind}?crs={crs}{fields}" if kind != "None" else f"None?{fields[1:]}", "layer", "memory")
     for number in range(max(len(shapes), len(values))):

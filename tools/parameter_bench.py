@@ -54,18 +54,7 @@ class Bench:
 def bench(
     curve: Curve, heights: np.ndarray | float = 0.0, gaps: Gaps = (), scanner: Scanner = SCANNER, **clutter: int
 ) -> Bench:
-    """Build a scene of one track along a curve.
-
-    Parameters
-    ----------
-    curve : Curve
-    heights : float or (n,) array
-    gaps : Gaps
-        In both rails.
-    scanner : Scanner
-    **clutter
-        Attributes of `Clutter`.
-    """
+    """Build a scene of one track along a curve, with gaps in both rails and with clutter."""
     plan = Plan(
         [Track(curve, spacing(STANDARD), heights)],
         STANDARD,

@@ -11,16 +11,7 @@ from matplotlib.figure import Figure
 
 
 def draw_pictures(pictures: Mapping[str, Callable[[], Figure]], folder: Path, dpi: int, names: Sequence[str]) -> None:
-    """Draw the pictures that are named, or all, as PNG files of their names.
-
-    Parameters
-    ----------
-    pictures : mapping of str to callable
-        What draws each picture.
-    folder : Path
-    dpi : int
-    names : sequence of str
-    """
+    """Draw the pictures that are named, or all, as PNG files of their names."""
     unknown = sorted({*names} - {*pictures})
     if unknown:
         sys.exit(f"There is no picture {unknown[0]}: choose from {', '.join(pictures)}.")

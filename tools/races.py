@@ -34,22 +34,9 @@ KEPT = "_new"
 
 
 def race_once(name: str, folder: Path, first: int, delays_s: tuple[float, float]) -> str:
-    """Have two processes write versions `first` and `first + 1` at once, and return what is there.
+    """Have two processes write versions `first` and `first + 1` at once, after delays, and return what is there.
 
-    Parameters
-    ----------
-    name : str
-        Key of `FORMATS`.
-    folder : Path
-        Folder of the file.
-    first : int
-    delays_s : tuple of float
-        Time that each process waits before it writes.
-
-    Returns
-    -------
-    str
-        "one whole, one refused" or what is wrong.
+    This is "one whole, one refused" or what is wrong.
     """
     file, write, read = FORMATS[name]
     ready, go = os.pipe(), os.pipe()

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.sparse import block_diag, csr_matrix, diags, vstack
 
 from ..polyline import Polyline, cross
-from .cross_sections import STATION_M, Sections
+from .ridges import OUTLIER, STATION_M, Sections
 from .search import parallel
 
 LITTLE = 1e-12
@@ -41,9 +41,6 @@ third differences of 0.056 m, the toe of a switch 0.3 m; its tracks part with se
 CURVE_PASSES = 12
 """Weightings of the curve, after which it hardly moves."""
 
-OUTLIER = 3.0
-"""Residual, in standard errors, at which a section has lost 3/4 of its weight."""
-
 TRUSTED = 0.2
 """Least weight of the sections whose residuals judge the standard errors."""
 
@@ -65,15 +62,9 @@ FOOT_ROUNDS = 2
 
 @dataclass(frozen=True)
 class Smooth:
-    """A smooth curve.
+    """A smooth curve through n places: `values`, (n, d), and the differences that are penalised, `rows`, (k, n).
 
-    Attributes
-    ----------
-    values : (n, d) array
-    covariance : (n, n) array
-        That of the curve, if each place has the variance 1 / weight.
-    rows : (k, n) matrix
-        The differences that are penalised.
+    `covariance`, (n, n), is that of the curve if each place has the variance 1 / weight.
     """
 
     values: np.ndarray
@@ -93,18 +84,10 @@ class Smooth:
 
 
 def smooth(values: np.ndarray, weight: np.ndarray, rows: csr_matrix, sigma: float | np.ndarray) -> Smooth:
-    """Return the curve that balances places and smoothness.
+    """Return the curve that balances places, `values` (n, d), and smoothness.
 
-    Parameters
-    ----------
-    values : (n, d) array
-        Places; those with a weight of 0 may hold any number.
-    weight : (n,) array
-        1 / variance of each.
-    rows : (k, n) matrix
-        Differences that are small, such as those of `differences`.
-    sigma : float or (k,) array
-        Their standard deviation.
+    `weight`, (n,), is 1 / variance; places with a weight of 0 may hold any number. `rows`, (k, n), such as those of
+    `differences`, give differences that are small: `sigma`, one or (k,), is their standard deviation.
     """
     stiffness = np.broadcast_to(1 / np.square(sigma), rows.shape[0])
     matrix = (rows.T @ diags(stiffness) @ rows).toarray()
@@ -122,16 +105,11 @@ def differences(count: int, order: int) -> csr_matrix:
 
 
 @dataclass(frozen=True)
-class Curve:
-    """The curve of a track at the middles of its sections.
+class TrackCurve:
+    """The curve of a track at the middles of its sections, `xy` (n, 2).
 
-    Attributes
-    ----------
-    xy : (n, 2) array
-    sigma : (n,) array
-        Standard error across, metres.
-    beside : (n,) array
-        Distance of the section's own middle from the curve, metres.
+    `sigma`, (n,), is the standard error across, and `beside`, (n,), the distance of the section's own middle from the
+    curve, metres.
     """
 
     xy: np.ndarray
@@ -139,16 +117,11 @@ class Curve:
     beside: np.ndarray
 
 
-def draw_together(lines: Sequence[Polyline], found: Sequence[Sections]) -> list[Curve]:
-    """Draw the curves of tracks through their sections.
+def draw_together(lines: Sequence[Polyline], found: Sequence[Sections]) -> list[TrackCurve]:
+    """Draw the curves of tracks through their sections, which are seen on `lines`.
 
     How much curvature and distance change is measured along the tracks (expectation maximisation of the variance of the
     differences), so that a straight stays stiff beside a transition and a switch.
-
-    Parameters
-    ----------
-    lines : sequence of Polyline
-        On which the sections are seen.
     """
     stations = [one.stations_on(line) for line, one in zip(lines, found)]
     place = np.concatenate([line.at(t) for line, t in zip(lines, stations)])
@@ -167,7 +140,9 @@ def draw_together(lines: Sequence[Polyline], found: Sequence[Sections]) -> list[
         turn_m = stiff.measured(curve.bend)
     error, good = np.sqrt(curve.variance), shows & (robust > TRUSTED)
     parts = np.split(np.arange(len(target)), np.cumsum([len(t) for t in stations])[:-1])
-    return [Curve(curve.values[at], error[at] * _spread((beside / sigma)[at][good[at]]), beside[at]) for at in parts]
+    return [
+        TrackCurve(curve.values[at], error[at] * _spread((beside / sigma)[at][good[at]]), beside[at]) for at in parts
+    ]
 
 
 def _spread(residual: np.ndarray) -> float:
@@ -177,17 +152,10 @@ def _spread(residual: np.ndarray) -> float:
 
 @dataclass(frozen=True)
 class _Stiffness:
-    """The differences that are small: those of each track, and those of the distances between them.
+    """The differences that are small, those of each track and of their distances: `rows`, (k, n) over all stations.
 
-    Attributes
-    ----------
-    rows : (k, n) matrix
-        Over the stations of all tracks.
-    first : (k,) array
-        Standard deviations with which the search for them begins.
-    blocks : list of (int, float, int)
-        Number of rows that follow each other along the line, their standard deviation where nothing turns, and for how
-        many sections this counts.
+    The search for their standard deviations begins with `first`, (k,). A block is the number of rows that follow each
+    other along the line, their standard deviation where nothing turns, and for how many sections this counts.
     """
 
     rows: csr_matrix

@@ -1,28 +1,70 @@
-"""Track centerlines of clouds of any size: the surroundings of the guides are read, and fitted square by square."""
+"""Track centerlines of clouds of any size: the surroundings of the guides are read, and fitted square by square.
+
+The squares are those of a grid anchored at the zero of the coordinate system, by which the points are sorted on disk,
+so that memory does not grow with the length of a railway. In each, the pieces of all guides are fitted together, with
+as much of them around it as their curves depend on. Of any cloud, only what the fit needs is kept.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
 from ..clouds.points import Request, strips_of
+from ..clouds.readers import Extent, read_classes
 from ..errors import NoRailPointsError, ParameterError
 from ..frame import LocalFrame
 from ..parameters import AirborneParameters
 from ..polyline import Polyline
-from ..progress import Progress
-from ..run.tasks import Context, Task
+from ..progress import SILENT, Progress
+from ..run.loop import Runner
+from ..run.tasks import READ_S, Context, Task
 from ..standards import STANDARDS
 from ..tiles.grid import Key
-from ..tiles.store import counts_of, files_of, read_stored
-from .cross_sections import STATION_M
-from .fitting import EMPTY, SEEN, Fitted, Stations, fit_tracks
+from ..tiles.store import SortedFile, append, counts_of, files_of, read_stored
+from .fitting import EMPTY, SEEN, Fitted, TrackStations, fit_tracks
 from .guide_line import axis_of_guide
-from .reading import POINT, Piece, Run, density_of, pieces_by_square, spool
-from .remarks import FLIGHT, are_hints, on_density, on_gauges, on_shapes, refuse_mobile
-from .survey import AirborneTrack, Guide, Survey, joined_others, lines_of, track_of
+from .ridges import HALF_M, STATION_M
+from .rounds import WIDE_M
+from .survey import (
+    FLIGHT,
+    AirborneSurvey,
+    AirborneTrack,
+    GuideLine,
+    are_hints,
+    joined_others,
+    lines_of,
+    on_density,
+    on_gauges,
+    on_shapes,
+    refuse_mobile,
+    track_of,
+)
+
+SIDE_M = 1000.0
+"""Side of the squares: with 40 points per square metre and four tracks, one needs 0.3 GB."""
+
+MARGIN_M = 120.0
+"""Length of a guide beyond the square on which a curve within it depends: twelve stations."""
+
+CELL_M = 16.0
+"""Side of the cells that make up the surroundings of guides."""
+
+AREA_M = 200.0
+"""Length of guide in a rectangle in which points are read."""
+
+ROW = 2**31
+"""Cells in a row, so that one number stands for a cell."""
+
+POINT = np.dtype([("xyz", "<f8", 3), ("mark", "<u4")])
+"""A point on disk: metres from the zero of the coordinate system, and its mark, see `passes.marks_of`."""
+
+PLACE_M = 2.0
+"""Side of the squares in which the density is counted."""
 
 FIT_S = 2e-5
 """Run time of the fit per point, in seconds."""
@@ -35,19 +77,143 @@ OTHER_GAUGE_M, LEAST_SHOWN = 0.1, 0.5
 must show."""
 
 
-def survey_files(run: Run, guides: Sequence[Guide]) -> Survey:
+@dataclass(frozen=True)
+class Run:
+    """A run on an airborne cloud: one task per file and one per square.
+
+    The caller removes the folder, which holds 28 bytes for each point around the guides.
+    """
+
+    request: Request
+    parameters: AirborneParameters
+    folder: Path
+    runner: Runner
+    progress: Progress = SILENT
+
+
+@dataclass(frozen=True)
+class GuidePart:
+    """The part of guide `number` in a square, whose stations are those between two chainages of the guide.
+
+    The axis has margins, and its first chainage is a multiple of `STATION_M`.
+    """
+
+    number: int
+    axis: Polyline
+    first_m: float
+    last_m: float
+
+
+def pieces_by_square(axes: Sequence[Polyline]) -> dict[Key, tuple[GuidePart, ...]]:
+    """Divide guides into squares."""
+    found: dict[Key, list[GuidePart]] = {}
+    for number, axis in enumerate(axes):
+        for key, first_m, last_m in _stays(axis):
+            low_m = max(np.floor((first_m - MARGIN_M) / STATION_M) * STATION_M, 0.0)
+            inside = slice(*np.searchsorted(axis.t, [low_m, np.nextafter(last_m + MARGIN_M, np.inf)]))
+            around = Polyline(axis.xy[inside], axis.t[inside])
+            found.setdefault(key, []).append(GuidePart(number, around, first_m, last_m))
+    return {key: tuple(pieces) for key, pieces in sorted(found.items())}
+
+
+def _stays(axis: Polyline) -> Iterator[tuple[Key, float, float]]:
+    """Yield each stay of a guide in a square, by the middles of its sections, with the chainages of its ends."""
+    count = max(int(np.ceil(axis.t[-1] / STATION_M)), 1)
+    middles = (np.arange(count) + 0.5) * STATION_M
+    keys = np.floor(axis.at(middles) / SIDE_M).astype(np.int64)
+    turns = np.flatnonzero((np.diff(keys, axis=0) != 0).any(axis=1)) + 1
+    for run in np.split(np.arange(count), turns):
+        key = (int(keys[run[0], 0]), int(keys[run[0], 1]))
+        yield key, float(run[0] * STATION_M), float((run[-1] + 1) * STATION_M)
+
+
+def cells_around(axes: Sequence[Polyline], reach_m: float) -> np.ndarray:
+    """Return the numbers of the cells within reach of lines, rising."""
+    steps = np.arange(-int(np.ceil(reach_m / CELL_M)), int(np.ceil(reach_m / CELL_M)) + 1)
+    around = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
+    cells = np.unique(np.concatenate([np.floor(axis.xy / CELL_M).astype(np.int64) for axis in axes]), axis=0)
+    return np.unique(numbers_of((cells[:, None] + around).reshape(-1, 2)))
+
+
+def in_cells(xy: np.ndarray, cells: np.ndarray) -> np.ndarray:
+    """Return which places, (n, 2), lie in cells, given by their numbers, (n,) bool."""
+    number = numbers_of(np.floor(xy / CELL_M).astype(np.int64))
+    at = np.minimum(np.searchsorted(cells, number), len(cells) - 1)
+    return cells[at] == number
+
+
+def numbers_of(cells: np.ndarray) -> np.ndarray:
+    """Return a number for each cell, given by its column and row, (n, 2)."""
+    return cells[:, 0] * ROW + cells[:, 1]
+
+
+def areas_along(pieces: Sequence[GuidePart], reach_m: float) -> np.ndarray:
+    """Return rectangles that hold all places within reach of the pieces, (k, 4) metres."""
+    parts = [
+        part for piece in pieces for part in np.array_split(piece.axis.xy, max(int(len(piece.axis.xy) / AREA_M), 1))
+    ]
+    low, high = (np.array([reduce(part, axis=0) for part in parts]) for reduce in (np.min, np.max))
+    return np.column_stack([low - reach_m, high + reach_m])
+
+
+def spool(run: Run, squares: Mapping[Key, tuple[GuidePart, ...]]) -> list[SortedFile]:
+    """Sort the points around the guides into squares on disk."""
+    request, folder = run.request, run.folder
+    wide_m = run.parameters.reach_m + WIDE_M + HALF_M
+    areas = {key: areas_along(pieces, wide_m) / request.zero.horizontal_unit_m for key, pieces in squares.items()}
+    around = {key: cells_around([piece.axis for piece in pieces], wide_m) for key, pieces in squares.items()}
+    tasks = {}
+    for number, header in enumerate(request.headers):
+        touched = {key: some for key, all_areas in areas.items() if len(some := _touched(all_areas, header.extent))}
+        if touched:
+            arguments = (request, number, np.concatenate([*touched.values()]), {key: around[key] for key in touched})
+            weight = READ_S * (header.point_count + 1)
+            tasks[number] = Task(header.path.name, spool_file, (*arguments, folder), weight=weight)
+    return [one for _, one in run.runner.run(tasks, run.progress)]
+
+
+def _touched(areas: np.ndarray, extent: Extent) -> np.ndarray:
+    """Return the rectangles, (k, 4), that touch an extent; one of NaN may be anywhere."""
+    low, high = np.array(extent[:2]), np.array(extent[2:])
+    return areas[~((areas[:, :2] > high) | (areas[:, 2:] < low)).any(axis=1)]
+
+
+def spool_file(
+    request: Request, number: int, areas: np.ndarray, around: Mapping[Key, np.ndarray], folder: Path, context: Context
+) -> SortedFile:
+    """Sort the points of a file into squares; a task.
+
+    Given are rectangles in which points are needed, (k, 4) in units of the CRS, and the cells whose points each square
+    needs.
+    """
+    header, mine = request.headers[number], SortedFile.new_folder(folder)
+    counts: Counter[Key] = Counter()
+    anywhere = np.unique(np.concatenate([*around.values()]))
+    chunks = read_classes(header.path, request.class_codes, context.progress, areas, request.leave_out)
+    for xyz, _, marks, _ in chunks:
+        local = request.zero.to_local(xyz)
+        kept = in_cells(local[:, :2], anywhere) & request.holds(xyz)
+        points = np.empty(int(kept.sum()), POINT)
+        points["xyz"], points["mark"] = local[kept], marks[kept]
+        for key, cells in around.items():
+            own = points[in_cells(points["xyz"][:, :2], cells)]
+            if len(own):
+                counts[key] += len(own)
+                append(mine, key, own)
+    return SortedFile(str(mine), counts)
+
+
+def density_of(xy: np.ndarray) -> np.ndarray:
+    """Return the number of places, (n, 2), in each square of `PLACE_M` that has one, per square metre."""
+    _, number = np.unique(numbers_of(np.floor(xy / PLACE_M).astype(np.int64)), return_counts=True)
+    return number / PLACE_M**2
+
+
+def survey_files(run: Run, guides: Sequence[GuideLine]) -> AirborneSurvey:
     """Find the track of each guide in a cloud.
 
-    Raises
-    ------
-    CloudError
-        A file is damaged, or the cloud is one of mobile lidar.
-    DiskError
-        The disk is full.
-    NoRailPointsError
-        No point of these classes lies along the guides.
-    ParameterError
-        No guide lies in the cloud, or one is too short.
+    Raises CloudError if a file is damaged or the cloud is one of mobile lidar, NoRailPointsError if no point of these
+    classes lies along the guides, and ParameterError if no guide lies in the cloud, or one is too short.
     """
     request, parameters, progress = run.request, run.parameters, run.progress
     _check_degrees(request, guides)
@@ -84,16 +250,16 @@ def survey_files(run: Run, guides: Sequence[Guide]) -> Survey:
     for warning in warnings:
         progress.warning(warning)
     progress.info(FLIGHT)
-    return Survey(numbered, lines, frame, density, tuple(warnings))
+    return AirborneSurvey(numbered, lines, frame, density, tuple(warnings))
 
 
 def _fit(
     run: Run,
-    squares: Mapping[Key, tuple[Piece, ...]],
+    squares: Mapping[Key, tuple[GuidePart, ...]],
     files: Mapping[Key, list[str]],
     counts: Mapping[Key, int],
     spacings_m: Sequence[float],
-) -> list[list[tuple[Piece, Fitted]]]:
+) -> list[list[tuple[GuidePart, Fitted]]]:
     """Fit all squares that have points, and return what was found along each guide, piece by piece."""
     tasks: dict[Key, Task] = {
         key: Task(
@@ -106,14 +272,14 @@ def _fit(
         if key in counts
     }
     found: dict[Key, list[Fitted]] = dict(run.runner.run(tasks, run.progress))
-    fitted: list[list[tuple[Piece, Fitted]]] = [[] for _ in spacings_m]
+    fitted: list[list[tuple[GuidePart, Fitted]]] = [[] for _ in spacings_m]
     for key in tasks:
         for piece, one in zip(squares[key], found[key]):
             fitted[piece.number].append((piece, one))
     return fitted
 
 
-def _check_degrees(request: Request, guides: Sequence[Guide]) -> None:
+def _check_degrees(request: Request, guides: Sequence[GuideLine]) -> None:
     """Refuse guides that are in degrees without saying so: a cloud has no such small coordinates."""
     largest = np.nanmax(np.abs([header.extent for header in request.headers]))
     if largest > 360 and all((np.abs(guide.xy[:, :2]) <= [180, 90]).all() for guide in guides):
@@ -122,10 +288,10 @@ def _check_degrees(request: Request, guides: Sequence[Guide]) -> None:
         )
 
 
-def _axes(guides: Sequence[Guide], request: Request) -> tuple[list[Guide], list[Polyline], list[str]]:
+def _axes(guides: Sequence[GuideLine], request: Request) -> tuple[list[GuideLine], list[Polyline], list[str]]:
     """Return the guides that are long enough, their axes in metres, and a sentence on those that are not."""
-    kept: list[tuple[Guide, Polyline]] = []
-    short: list[tuple[Guide, float]] = []
+    kept: list[tuple[GuideLine, Polyline]] = []
+    short: list[tuple[GuideLine, float]] = []
     for guide in guides:
         xy = request.zero.to_local(np.column_stack([guide.xy[:, :2], np.zeros(len(guide.xy))]))[:, :2]
         xy = xy[np.append(True, np.hypot(*np.diff(xy, axis=0).T) > 0)]
@@ -171,7 +337,7 @@ def _check_inside(request: Request, axes: Sequence[Polyline], reach_m: float) ->
 
 def fit_square(
     files: Sequence[str],
-    pieces: Sequence[Piece],
+    pieces: Sequence[GuidePart],
     spacings_m: Sequence[float],
     parameters: AirborneParameters,
     context: Context,
@@ -214,20 +380,20 @@ def _shown_otherwise(
     return shown_m
 
 
-def _moved(fitted: Fitted, origin: np.ndarray, piece: Piece) -> Fitted:
+def _moved(fitted: Fitted, origin: np.ndarray, piece: GuidePart) -> Fitted:
     """Return the stations within the square, in metres from the zero of the coordinate system."""
     stations = fitted.stations
     own = (stations.t > piece.first_m) & (stations.t < piece.last_m)
     columns = {name: values[own] for name, values in vars(stations).items()}
     columns["xy"], columns["bed"] = columns["xy"] + origin[:2], columns["bed"] + origin[2]
     others = fitted.others[(fitted.others[:, 0] > piece.first_m) & (fitted.others[:, 0] < piece.last_m)]
-    return replace(fitted, stations=Stations(**columns), others=others)
+    return replace(fitted, stations=TrackStations(**columns), others=others)
 
 
 def _joined(
-    guide: Guide,
+    guide: GuideLine,
     axis: Polyline,
-    parts: Sequence[tuple[Piece, Fitted]],
+    parts: Sequence[tuple[GuidePart, Fitted]],
     spacing_m: float,
     rail_height_m: float,
     zero: LocalFrame,
@@ -251,7 +417,7 @@ def _joined(
     shift = zero.shift_to(frame)
     columns["xy"], columns["bed"] = columns["xy"] + shift[:2], columns["bed"] + shift[2]
     others = joined_others(np.concatenate([one.others for _, one in parts] or [np.empty((0, 2))]))
-    return track_of(guide, Stations(**columns), spacing_m, rail_height_m, frame, others)
+    return track_of(guide, TrackStations(**columns), spacing_m, rail_height_m, frame, others)
 
 
 def _frame(zero: LocalFrame, axes: Sequence[Polyline]) -> LocalFrame:

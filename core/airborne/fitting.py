@@ -10,12 +10,10 @@ from scipy.spatial import cKDTree
 
 from ..polyline import Polyline
 from ..progress import SILENT, Progress
-from .cross_sections import EDGE_M, STATION_M
-from .guide_line import SECTION_M, Points, gather
-from .ridges import HALF_M, Shape
-from .rivals import LONG, TRACKS_APART_M, WIDE_M, Beside, look_beside
-from .rounds import REACHES_M, Refined, Traced, refine, strip_error
-from .search import Course, Evidence, certainty, courses, evidence, groups, slopes
+from .guide_line import SECTION_M, GuidePoints, gather
+from .ridges import EDGE_M, HALF_M, STATION_M, RidgeShape
+from .rounds import LONG, REACHES_M, TRACKS_APART_M, WIDE_M, Beside, Refined, Traced, look_beside, refine, strip_error
+from .search import Evidence, GuideCourse, certainty, courses, evidence, groups, slopes
 
 LONG_GAIN, LONG_SHARE = 7.0, 0.25
 """Gain that two rails must have over 70 m, and the share of the expected gain: roads, hedges and ditches stay below."""
@@ -81,27 +79,13 @@ SEEN, EMPTY, HIDDEN, MISLED, UNSURE, TWIN, ASIDE, SPARSE = range(len(REASONS))
 
 
 @dataclass(frozen=True)
-class Stations:
-    """Stations of a track every `STATION_M` along its guide.
+class TrackStations:
+    """Stations of a track every `STATION_M` along its guide, (n,) arrays; lengths in metres.
 
-    Attributes
-    ----------
-    t : (n,) array
-        Chainage along the guide, metres.
-    xy : (n, 2) array
-        Middle of the track.
-    bed : (n,) array
-        Height of the bed there.
-    tilt : (n,) array
-        Rise of the bed per metre to the left.
-    sigma, sigma_bed : (n,) arrays
-        Standard errors across and of the bed's height, metres.
-    margin : (n,) array
-        Score of the place above that of another one.
-    reason : (n,) int array
-        Place in `REASONS`; 0 where the track is seen.
-    switch : (n,) bool array
-        Whether another track begins or ends beside it.
+    `t` is the chainage along the guide, `xy`, (n, 2), the middle of the track, `bed` the height of the bed there, and
+    `tilt` its rise per metre to the left; `sigma` and `sigma_bed` are the standard errors across and of the bed's
+    height. `margin` is the score of the place above that of another one, `reason` a place in `REASONS`, 0 where the
+    track is seen, and `switch` holds where another track begins or ends beside it.
     """
 
     t: np.ndarray
@@ -119,18 +103,13 @@ class Stations:
 class Fitted:
     """What was found along a guide.
 
-    Attributes
-    ----------
-    shape : Shape or None
-        Ridges as they were measured; None where no track was found.
-    shown_m : float
-        Distance of the rails that the points show where it is clearly not the expected one, else NaN.
-    others : (k, 2) array
-        Chainages and distances to the left of places that look like tracks and have no guide.
+    `shape` has the ridges as they were measured, None where no track was found; `shown_m` is the distance of the rails
+    that the points show where it is clearly not the expected one, else NaN. `others`, (k, 2), holds chainages and
+    distances to the left of places that look like tracks and have no guide.
     """
 
-    stations: Stations
-    shape: Shape | None
+    stations: TrackStations
+    shape: RidgeShape | None
     shown_m: float
     others: np.ndarray
 
@@ -144,29 +123,18 @@ def fit_tracks(
     footprint_m: float,
     progress: Progress = SILENT,
 ) -> list[Fitted]:
-    """Fit the tracks along the guides of a line.
+    """Fit the tracks along the guides of a line to the points around them, `xyz` (n, 3), metres.
 
-    Parameters
-    ----------
-    xyz : (n, 3) array
-        Points around the guides, metres.
-    strip : (n,) int array
-        Number of the strip of each.
-    axes : sequence of Polyline
-        The guides.
-    spacings_m : sequence of float
-        Distance between the middles of the railheads, by guide.
-    reach_m : float
-        Largest distance of a track from its guide.
-    footprint_m : float
-        Diameter of the beam on the ground.
+    `strip`, (n,), is the number of each point's strip, `spacings_m` the distance between the middles of the railheads
+    by guide, `reach_m` the largest distance of a track from its guide, and `footprint_m` the diameter of the beam on
+    the ground.
     """
-    shapes = [Shape.expected(spacing_m, footprint_m) for spacing_m in spacings_m]
+    shapes = [RidgeShape.expected(spacing_m, footprint_m) for spacing_m in spacings_m]
     looking, fitting = progress.divide((3.0, 2.0))
-    near: list[Points] = []
+    near: list[GuidePoints] = []
     found: list[tuple[int, Evidence]] = []
     for number, axis in looking.follow(list(enumerate(axes)), len(axes)):
-        near.append(Points.near(axis, xyz, strip, reach_m + WIDE_M + HALF_M))
+        near.append(GuidePoints.near(axis, xyz, strip, reach_m + WIDE_M + HALF_M))
         corridor = gather(near[number], axis, reach_m + HALF_M + slopes()[-1] * SECTION_M / 2)
         if corridor is not None:
             found.append((number, evidence(corridor, reach_m, shapes[number])))
@@ -188,12 +156,12 @@ def fit_tracks(
 @dataclass(frozen=True)
 class _Line:
     refined: Refined
-    course: Course
+    course: GuideCourse
     sure: np.ndarray
     beside: Beside | None
 
     @classmethod
-    def seen(cls, points: Points, refined: Refined, course: Course, sure: np.ndarray) -> _Line:
+    def seen(cls, points: GuidePoints, refined: Refined, course: GuideCourse, sure: np.ndarray) -> _Line:
         """Look beside a line that was fitted."""
         wide = gather(points, refined.line, WIDE_M + HALF_M)
         beside = None if wide is None else look_beside(wide, refined.seen.shape, len(refined.t))
@@ -215,7 +183,7 @@ def _judged(axes: Sequence[Polyline], lines: dict[int, _Line], footprint_m: floa
         reason = _reasons(line, distance < SWITCH_M)
         reason[(reason == SEEN) & (sigma > toe * MAX_SIGMA_M)] = SPARSE
         reason[(reason == SEEN) & (distance < TWIN_M) & (apart > TRACKS_APART_M)] = TWIN
-        stations = Stations(
+        stations = TrackStations(
             refined.t,
             refined.curve.xy,
             refined.bed,
@@ -235,7 +203,7 @@ def _nothing(axis: Polyline) -> Fitted:
     t = axis.t[0] + (np.arange(max(int(np.ceil((axis.t[-1] - axis.t[0]) / STATION_M)), 1)) + 0.5) * STATION_M
     unknown = np.full(len(t), np.nan)
     reason = np.full(len(t), HIDDEN)
-    stations = Stations(
+    stations = TrackStations(
         t, axis.at(t), unknown, unknown, unknown, unknown, np.zeros(len(t)), reason, np.zeros(len(t), bool)
     )
     return Fitted(stations, None, np.nan, np.empty((0, 2)))

@@ -42,25 +42,15 @@ OWN_LEVEL_M, MIN_SHARED = 2.0, 5
 
 
 @dataclass(frozen=True)
-class Points:
-    """Points around a guide.
-
-    Attributes
-    ----------
-    xyz : (n, 3) array
-        Metres.
-    strip : (n,) int array
-        Number of the strip of each.
-    t : (n,) array
-        Chainage of each along the guide.
-    """
+class GuidePoints:
+    """Points around a guide: places, (n, 3) metres, the number of each one's strip, and its chainage on the guide."""
 
     xyz: np.ndarray
     strip: np.ndarray
     t: np.ndarray
 
     @classmethod
-    def near(cls, line: Polyline, xyz: np.ndarray, strip: np.ndarray, reach_m: float) -> Points:
+    def near(cls, line: Polyline, xyz: np.ndarray, strip: np.ndarray, reach_m: float) -> GuidePoints:
         """Return the points, (n, 3) of strips (n,), within reach of a line."""
         feet = line.feet(xyz[:, :2], reach_m)
         return cls(xyz[feet.point], strip[feet.point], feet.t)
@@ -117,18 +107,10 @@ def _smoothed(xy: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Corridor:
-    """Points along an axis.
+    """Points along an axis, (n,) arrays: chainage, distance to the left, height above the level, metres, and strip.
 
-    Attributes
-    ----------
-    t, across, height : (n,) arrays
-        Chainage, distance to the left, height above the level, metres.
-    strip : (n,) int array
-        Number of the strip, from 0.
-    start_m : float
-        Chainage at which the first section begins.
-    level : (k,) array
-        Height of the bed in the middle of each section of `SECTION_M`.
+    The first section begins at `start_m`; `level`, (k,), is the height of the bed in the middle of each section of
+    `SECTION_M`.
     """
 
     t: np.ndarray
@@ -162,7 +144,7 @@ class Corridor:
         return Corridor(t, across, height, strip, self.start_m, self.level)
 
 
-def gather(points: Points, axis: Polyline, reach_m: float) -> Corridor | None:
+def gather(points: GuidePoints, axis: Polyline, reach_m: float) -> Corridor | None:
     """See points along an axis, up to a distance from it; None if there is no level to see."""
     t, across = axis.feet_near(points.xyz[:, :2], points.t)
     near = np.abs(across) <= reach_m

@@ -2,14 +2,18 @@
 
 The height across a track is that of a bed that is level but for cant and a slight bow, and of two ridges of the same
 height at the distance of the rails. A place is compared with a bed without them, with a bed with one of them only, and
-with a bed that ends in an edge where the other should stand: each rail must earn its half (docs/airborne.md).
+with a bed that ends in an edge where the other should stand: each rail must earn its half (docs/airborne.md). The whole
+profile of a line shows its ridges, and every section of it the middle of the track.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+
+from ..polyline import Polyline
+from .guide_line import Corridor
 
 HALF_M = 1.25
 """Half the width of the bed that is looked at: a platform may begin 0.25 m farther out."""
@@ -36,7 +40,7 @@ EDGE_INSIDE_M = 0.15
 """Distance inside of the rail at which such an edge begins."""
 
 OUTLIER = 3.0
-"""Residual, in standard deviations, at which a bin has lost half of its weight."""
+"""Residual, in standard deviations, at which a bin, or a section of a curve, has lost 3/4 of its weight."""
 
 FLAT_LOSS = 0.45
 """Loss per bin of a bed that is flat but for noise; what is beyond counts against a place."""
@@ -44,23 +48,49 @@ FLAT_LOSS = 0.45
 UNSEEN_VARIANCE = 1e9
 """Variance of a bin without points."""
 
+STATION_M = 10.0
+"""Length of a section of the fit, and the distance of stations."""
+
+BIN_M, PROFILE_BIN_M = 0.025, 0.02
+"""Width of the bins across in the fit of a section, and in the profile of a whole line."""
+
+WIDTHS_M = np.arange(0.04, 0.24, 0.01)
+SPACINGS_M = np.arange(-0.12, 0.121, 0.02)
+"""Widths of a ridge that are tried, and deviations of the rails' distance, up to those between neighbouring gauges."""
+
+OTHER_GAIN, OTHER_SHARE, OTHER_M = 40.0, 0.1, 0.045
+"""Log-likelihood of another distance of the rails above that of the expected one, also as a share of its own, and the
+deviation, from which it is said: ballast piled at the rails shifts the ridges by up to 20 mm."""
+
+PROFILE_ROUGH_M, FREE = 0.004, 3.0
+"""Roughness of a profile, and the spread of the ridge's height while it is measured."""
+
+LOWEST, HIGHEST = 0.3, 2.2
+"""Heights of a ridge, as shares of the expected one, between which a measured one is believed."""
+
+SECTION_ROUGH_M, SECTION_SPREAD = 0.018, 0.15
+"""What averaging does not remove in a bin of a section, and the spread of the ridge's height along a line."""
+
+PARABOLA = 4
+"""Steps on either side of the best place through which a parabola states middle and standard error."""
+
+LEAST_SIGMA_M = 0.004
+"""Standard error of a section below which the scanner itself is not good enough."""
+
+ENOUGH_GAIN = 6.0
+"""A section shows a track if three of them gain more than this."""
+
+EDGE_M = 0.01
+"""A middle this close to the end of the search lies beyond it."""
+
 
 @dataclass(frozen=True)
-class Shape:
-    """Ridges as they are expected.
+class RidgeShape:
+    """Ridges as they are expected, metres.
 
-    Attributes
-    ----------
-    spacing_m : float
-        Distance between the middles of the railheads.
-    width_m, height_m : float
-        Standard deviation and height of a ridge.
-    noise_m : float
-        Standard deviation of a point's height.
-    rough_m : float
-        What averaging does not remove in a bin: sleepers and stones.
-    height_spread : float
-        Standard deviation of the height, as a share of it.
+    `spacing_m` is the distance between the middles of the railheads, `width_m` the standard deviation of a ridge, and
+    `height_m` its height, with the standard deviation `height_spread` as a share of it. A point's height has the
+    standard deviation `noise_m`; `rough_m` is what averaging does not remove in a bin: sleepers and stones.
     """
 
     spacing_m: float
@@ -76,7 +106,7 @@ class Shape:
         return (self.height_spread * self.height_m) ** -2
 
     @classmethod
-    def expected(cls, spacing_m: float, footprint_m: float) -> Shape:
+    def expected(cls, spacing_m: float, footprint_m: float) -> RidgeShape:
         """Return what a footprint makes of rails, before the cloud has been looked at."""
         width_m = max(MIN_WIDTH_M, footprint_m / 4 + HEAD_M)
         return cls(spacing_m, width_m, AREA_M2 / (NORMAL_AREA * width_m))
@@ -91,21 +121,13 @@ class Shape:
 
 
 @dataclass(frozen=True)
-class Fit:
-    """Fits of two ridges at many places.
+class RidgeFit:
+    """Fits of two ridges at many places, arrays of one shape.
 
-    Attributes
-    ----------
-    gain : array
-        Log-likelihood of two rails above that of a bed without them; the smaller rail counts twice.
-    both : array
-        The same without a check of the single rails: smooth along the places.
-    flaw : array
-        Loss of the bed beyond that of a flat one.
-    most : array
-        Gain of rails of the expected height, which no noise disturbs.
-    height, level, tilt : arrays
-        Height of the ridges, of the bed in the middle, and the rise of the bed per metre to the left.
+    `gain` is the log-likelihood of two rails above that of a bed without them, in which the smaller rail counts twice,
+    and `both` the same without a check of the single rails: smooth along the places. `flaw` is the loss of the bed
+    beyond that of a flat one, `most` the gain of rails of the expected height, which no noise disturbs. `height` is
+    that of the ridges, `level` that of the bed in the middle, and `tilt` its rise per metre to the left.
     """
 
     gain: np.ndarray
@@ -129,16 +151,10 @@ CHECKED = [
 """Pairs of columns whose products the models need, without and with the checks."""
 
 
-def fit(count: np.ndarray, height: np.ndarray, u: np.ndarray, shape: Shape, passes: int = 2) -> Fit:
-    """Fit bed and ridges to bins across the track.
+def fit(count: np.ndarray, height: np.ndarray, u: np.ndarray, shape: RidgeShape, passes: int = 2) -> RidgeFit:
+    """Fit bed and ridges to bins at distances `u`, (k,), from a place: number and mean height of the points, (..., k).
 
-    Parameters
-    ----------
-    count, height : (..., k) arrays
-        Number and mean height of the points in bins at distances `u` from a place.
-    u : (k,) array
-    passes : int
-        Robust weightings; the first is that of clean bins.
+    Of the robust weightings, `passes`, the first is that of clean bins.
     """
     columns = _columns(u, shape).astype(height.dtype)
     variance = np.where(count > 0, shape.noise_m**2 / np.maximum(count, 1) + shape.rough_m**2, UNSEEN_VARIANCE)
@@ -155,10 +171,10 @@ def fit(count: np.ndarray, height: np.ndarray, u: np.ndarray, shape: Shape, pass
     flaw = np.maximum(loss - FLAT_LOSS * (count > 0).sum(axis=-1), 0.0)
     both, gain = normal.gains(shape)
     most = 0.5 * shape.height_m**2 * np.maximum(normal.product[BOTH, BOTH], 0.0)
-    return Fit(gain, both, flaw, most, bed[..., BOTH], bed[..., LEVEL] - 0.5 * bed[..., BOWED], bed[..., TILTED])
+    return RidgeFit(gain, both, flaw, most, bed[..., BOTH], bed[..., LEVEL] - 0.5 * bed[..., BOWED], bed[..., TILTED])
 
 
-def _columns(u: np.ndarray, shape: Shape) -> np.ndarray:
+def _columns(u: np.ndarray, shape: RidgeShape) -> np.ndarray:
     """Return the columns of the models at distances from the middle, (10, k)."""
     left, right = shape.ridge(u, 1), shape.ridge(u, -1)
     bow = u * u - 0.5
@@ -169,12 +185,8 @@ def _columns(u: np.ndarray, shape: Shape) -> np.ndarray:
 class _Normal:
     """Normal equations of weighted bins, from which the bed has been eliminated.
 
-    Attributes
-    ----------
-    product : dict
-        Products of two columns, by their numbers; after the elimination, what the bed leaves of them.
-    data : dict
-        Products of each column and the heights, likewise.
+    `product` holds the products of two columns by their numbers, after the elimination what the bed leaves of them;
+    `data` those of each column and the heights.
     """
 
     def __init__(
@@ -201,7 +213,7 @@ class _Normal:
         for one, other in self._rest:
             product[one, other] = product[one, other] - share[one] * product[pivot, other]
 
-    def bed(self, shape: Shape) -> np.ndarray:
+    def bed(self, shape: RidgeShape) -> np.ndarray:
         """Return level, tilt and bow of the bed and the height of the ridges, (..., 4)."""
         stiff = shape.stiffness
         found = {BOTH: (self.data[BOTH] + stiff * shape.height_m) / (self.product[BOTH, BOTH] + stiff)}
@@ -210,7 +222,7 @@ class _Normal:
             found[number] = (self.data[number] - known) / self.product[number, number]
         return np.stack([found[number] for number in range(BOTH + 1)], axis=-1)
 
-    def gains(self, shape: Shape) -> tuple[np.ndarray, np.ndarray]:
+    def gains(self, shape: RidgeShape) -> tuple[np.ndarray, np.ndarray]:
         """Return the gain of two rails, and that which remains after all checks."""
         stiff, height_m = shape.stiffness, shape.height_m
         none = 0.5 * stiff * height_m**2
@@ -251,3 +263,82 @@ def binned(
 def windows(values: np.ndarray, width: int) -> np.ndarray:
     """Return the windows of some width along the last axis."""
     return np.lib.stride_tricks.sliding_window_view(values, width, axis=-1)
+
+
+@dataclass(frozen=True)
+class Sections:
+    """What each section of `STATION_M` shows, (n,) arrays, and the fit there.
+
+    `offset` is the middle of the track to the left of the axis and `sigma` its standard error, metres; `points` are
+    those on the bed, and `shows` holds where there are two rails.
+    """
+
+    offset: np.ndarray
+    sigma: np.ndarray
+    found: RidgeFit
+    points: np.ndarray
+    shows: np.ndarray
+
+    def stations_on(self, line: Polyline) -> np.ndarray:
+        """Return the chainages of the middles of the sections, (n,), on the line along which they were seen."""
+        return float(line.t[0]) + (np.arange(len(self.shows)) + 0.5) * STATION_M
+
+
+def measure(corridor: Corridor, shape: RidgeShape, shows: np.ndarray | None) -> tuple[RidgeShape, float]:
+    """Return the ridges that the profile of a whole line shows, and the distance of the rails if it is another one."""
+    near = np.abs(corridor.across) < HALF_M
+    if shows is not None and shows.any():
+        near &= shows[np.clip(corridor.section_of(STATION_M), 0, len(shows) - 1)]
+    bins = int(round(2 * HALF_M / PROFILE_BIN_M))
+    across, height = corridor.across[near], corridor.height[near]
+    count, mean = binned(np.zeros(len(across), dtype=np.int64), across, height, 1, -HALF_M, bins, PROFILE_BIN_M)
+    u = (np.arange(bins) + 0.5) * PROFILE_BIN_M - HALF_M
+    free = replace(shape, rough_m=PROFILE_ROUGH_M, height_spread=FREE)
+    tried = [replace(free, width_m=float(width)) for width in WIDTHS_M]
+    fits = [fit(count, mean, u, one) for one in tried]
+    best = int(np.argmax([one.both[0] for one in fits]))
+    height_m = float(np.clip(fits[best].height[0], LOWEST * shape.height_m, HIGHEST * shape.height_m))
+    residual = height - mean[0][np.clip(np.floor((across + HALF_M) / PROFILE_BIN_M).astype(np.int64), 0, bins - 1)]
+    noise_m = 1.4826 * float(np.median(np.abs(residual - np.median(residual)))) if len(residual) else shape.noise_m
+    found = RidgeShape(
+        shape.spacing_m, tried[best].width_m, height_m, max(noise_m, 0.01), SECTION_ROUGH_M, SECTION_SPREAD
+    )
+    return found, _other_spacing(count, mean, u, tried[best])
+
+
+def _other_spacing(count: np.ndarray, mean: np.ndarray, u: np.ndarray, shape: RidgeShape) -> float:
+    """Return the distance of the rails that a profile shows where it is clearly not the expected one, else NaN."""
+    gains = [
+        float(fit(count, mean, u, replace(shape, spacing_m=shape.spacing_m + more)).both[0]) for more in SPACINGS_M
+    ]
+    best, expected = int(np.argmax(gains)), gains[len(gains) // 2]
+    clearly = gains[best] - expected > max(OTHER_GAIN, OTHER_SHARE * gains[best])
+    return float(shape.spacing_m + SPACINGS_M[best]) if clearly and abs(SPACINGS_M[best]) > OTHER_M else np.nan
+
+
+def fit_sections(corridor: Corridor, shape: RidgeShape, reach_m: float, length_m: float = STATION_M) -> Sections:
+    """Fit the middle of the track in every section."""
+    half, aside = int(round(HALF_M / BIN_M)), int(round(reach_m / BIN_M))
+    width, places = 2 * half + 1, 2 * aside + 1
+    total = max(int(np.ceil(corridor.sections * STATION_M / 2 / length_m)), 1)
+    bins, low_m = places + width - 1, -(aside + half + 0.5) * BIN_M
+    count, height = binned(corridor.section_of(length_m), corridor.across, corridor.height, total, low_m, bins, BIN_M)
+    u, place = (np.arange(width) - half) * BIN_M, (np.arange(places) - aside) * BIN_M
+    found = fit(windows(count, width), windows(height, width), u, shape, passes=3)
+    middle = np.clip(found.both.argmax(axis=1), PARABOLA, places - 1 - PARABOLA)
+    rows, steps = np.arange(total), np.arange(-PARABOLA, PARABOLA + 1)
+    bent, leant, _ = np.polyfit(steps * BIN_M, found.both[rows[:, None], middle[:, None] + steps].T, 2)
+    sharp = np.maximum(-2 * bent, LITTLE_SHARP)
+    offset = place[middle] + np.clip(leant / sharp, -PARABOLA * BIN_M, PARABOLA * BIN_M)
+    at = np.clip(np.rint(offset / BIN_M).astype(np.int64) + aside, 0, places - 1)
+    points = windows(count, width)[rows, at].sum(axis=1)
+    here = RidgeFit(
+        *(getattr(found, name)[rows, at] for name in ("gain", "both", "flaw", "most", "height", "level", "tilt"))
+    )
+    together = np.convolve(here.both, np.ones(3))[1:-1]
+    shows = (together > ENOUGH_GAIN) & (here.both > 0) & (np.abs(offset) < reach_m - EDGE_M)
+    return Sections(offset, np.maximum(1 / np.sqrt(sharp), LEAST_SIGMA_M), here, points, shows)
+
+
+LITTLE_SHARP = 1.0
+"""Sharpness of a maximum, 1/m², that states nothing about the middle: a standard error of 1 m."""

@@ -1,18 +1,43 @@
-"""From courses to curves: in rounds, the ridges of each line are measured, its sections fitted, and curves drawn."""
+"""From courses to curves: in rounds, the ridges of each line are measured, its sections fitted, and curves drawn.
+
+What lies on and beside a fitted line is looked for over 70 m: two rails on a bed, a better place, or another track.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..polyline import Polyline
-from .cross_sections import ENOUGH_GAIN, LEAST_SIGMA_M, STATION_M, Sections, fit_sections, measure
-from .curves import FIRST_TURN_M, Curve, differences, draw_together, smooth
+from .curves import FIRST_TURN_M, TrackCurve, differences, draw_together, smooth
 from .guide_line import STEP_M as VERTEX_M
-from .guide_line import Corridor, Points, gather
-from .ridges import HALF_M, Shape
+from .guide_line import Corridor, GuidePoints, gather
+from .ridges import (
+    ENOUGH_GAIN,
+    HALF_M,
+    LEAST_SIGMA_M,
+    STATION_M,
+    RidgeShape,
+    Sections,
+    binned,
+    fit,
+    fit_sections,
+    measure,
+    windows,
+)
+from .search import STEP_M
+
+LONG = 7
+"""Sections that are looked at as one: one section may be hidden, or mislead."""
+
+WIDE_M = 5.6
+"""Distance from the line up to which places are compared: tracks of one line are rarely farther apart."""
+
+APART_M, REPEATED_M, TRACKS_APART_M = 0.4, 1.1, 2.8
+"""Places this far apart are others, those less far apart than a gauge have no rail of the line, and two tracks are at
+least this far apart."""
 
 REACHES_M = (0.45, 0.35, 0.25)
 """Distance from the line within which its middle is looked for, in each round."""
@@ -31,42 +56,92 @@ SHIFT_LENGTH_M, STRIP_SHIFT_M = 50.0, 0.1
 
 
 @dataclass(frozen=True)
-class Traced:
-    """A track whose course is known to half a metre.
+class Beside:
+    """Places `across`, (c,), to the left of a line and on it, for the `LONG` sections around each section.
 
-    Attributes
-    ----------
-    points : Points
-        Around the guide.
-    across : (sections,) array
-        Course of the track, see `search.Course`.
-    shape : Shape
-        Ridges as they are expected.
+    `gain`, `flaw` and `most`, (n, c), are those of `ridges.RidgeFit`.
     """
 
-    points: Points
+    across: np.ndarray
+    gain: np.ndarray
+    flaw: np.ndarray
+    most: np.ndarray
+
+    @property
+    def score(self) -> np.ndarray:
+        """Gain of two rails, less the flaws of the bed, (n, c)."""
+        return self.gain - self.flaw
+
+    @property
+    def on(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Gain, flaw and expected gain on the line, (n,) each."""
+        middle = len(self.across) // 2
+        return self.gain[:, middle], self.flaw[:, middle], self.most[:, middle]
+
+    @property
+    def rival(self) -> np.ndarray:
+        """Best score of a place that excludes the line, because two tracks are never so close, (n,)."""
+        return self._best(APART_M, TRACKS_APART_M)
+
+    @property
+    def repeated(self) -> np.ndarray:
+        """Best score of a place that the line's own rails can't make, as the furrows of a field do, (n,)."""
+        return self._best(APART_M, REPEATED_M)
+
+    def _best(self, low_m: float, high_m: float) -> np.ndarray:
+        """Return the best score of places between two distances, (n,)."""
+        apart = np.abs(self.across)
+        return self.score[:, (apart > low_m) & (apart < high_m)].max(axis=1)
+
+
+def look_beside(corridor: Corridor, shape: RidgeShape, sections: int) -> Beside:
+    """Compare the places beside a line, whose corridor reaches `WIDE_M` and half the width of a bed farther.
+
+    Stones and sleepers differ from section to section, so that averaging removes more of them over many.
+    """
+    half, places = int(round(HALF_M / STEP_M)), 2 * int(round(WIDE_M / STEP_M)) + 1
+    width = 2 * half + 1
+    bins = places + width - 1
+    low_m = -(places // 2 + half + 0.5) * STEP_M
+    count, height = binned(
+        corridor.section_of(STATION_M), corridor.across, corridor.height, sections, low_m, bins, STEP_M
+    )
+    total = _around(count * height)
+    count = _around(count)
+    height = total / np.maximum(count, 1)
+    u = (np.arange(width) - half) * STEP_M
+    long = replace(shape, rough_m=shape.rough_m / np.sqrt(LONG))
+    found = fit(windows(count, width), windows(height, width), u, long, passes=3)
+    return Beside((np.arange(places) - places // 2) * STEP_M, found.gain, found.flaw, found.most)
+
+
+def _around(values: np.ndarray) -> np.ndarray:
+    """Return the sums over the `LONG` sections around each, (n, k); there are fewer at the ends."""
+    padded = np.pad(values, ((LONG // 2 + 1, LONG // 2), (0, 0)))
+    total = np.cumsum(padded, axis=0, dtype=np.float64)
+    return (total[LONG:] - total[:-LONG]).astype(values.dtype)
+
+
+@dataclass(frozen=True)
+class Traced:
+    """A track whose course, `across` as in `search.GuideCourse`, is known to half a metre; its ridges as expected."""
+
+    points: GuidePoints
     guide: Polyline
     across: np.ndarray
-    shape: Shape
+    shape: RidgeShape
 
 
 @dataclass(frozen=True)
 class Seen:
-    """What shows along a line.
+    """What shows along a line, with the ridges as they were measured.
 
-    Attributes
-    ----------
-    axis : Polyline
-        The line.
-    shape : Shape
-        Ridges as they were measured.
-    shown_m : float
-        Distance of the rails that the points show where it is clearly not the expected one, else NaN.
+    `shown_m` is the distance of the rails that the points show where it is clearly not the expected one, else NaN.
     """
 
     axis: Polyline
     corridor: Corridor
-    shape: Shape
+    shape: RidgeShape
     shown_m: float
     sections: Sections
 
@@ -78,20 +153,13 @@ class Seen:
 
 @dataclass(frozen=True)
 class Refined:
-    """A line that was fitted.
+    """A line through a fitted curve, and what was seen along the curve before the last round.
 
-    Attributes
-    ----------
-    seen : Seen
-        Along the curve before the last round.
-    line : Polyline
-        Through the curve.
-    bed, sigma_bed : (n,) arrays
-        Height of the bed in the middle of the track, and its standard error.
+    `bed` and `sigma_bed`, (n,), are the height of the bed in the middle of the track and its standard error.
     """
 
     seen: Seen
-    curve: Curve
+    curve: TrackCurve
     line: Polyline
     bed: np.ndarray
     sigma_bed: np.ndarray
@@ -105,7 +173,7 @@ class Refined:
 def refine(tracks: Sequence[Traced]) -> list[Refined | None]:
     """Fit the curves of parallel tracks; None for those of which no section shows a track."""
     lines = {number: _first(track) for number, track in enumerate(tracks)}
-    found: dict[int, tuple[Seen, Curve, Polyline]] = {}
+    found: dict[int, tuple[Seen, TrackCurve, Polyline]] = {}
     for reach_m in REACHES_M:
         seen: dict[int, Seen] = {}
         for number, line in lines.items():
@@ -142,7 +210,7 @@ def _look(track: Traced, line: Polyline, last: Seen | None, reach_m: float) -> S
     return Seen(line, corridor, shape, shown_m, sections) if sections.shows.any() else None
 
 
-def _with_heights(seen: Seen, curve: Curve, line: Polyline) -> Refined:
+def _with_heights(seen: Seen, curve: TrackCurve, line: Polyline) -> Refined:
     """Smooth the heights of the bed as well."""
     sections = seen.sections
     level = sections.found.level + seen.corridor.level_at(seen.t)

@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 
 from ..polyline import Polyline
 from .guide_line import SECTION_M, Corridor
-from .ridges import HALF_M, Shape, binned, fit, windows
+from .ridges import HALF_M, RidgeShape, binned, fit, windows
 
 STEP_M, SLOPE_STEP, SLOPES = 0.05, 0.02, 7
 """Distance between the places that are tried, and the directions of the guide's errors: their step and number."""
@@ -62,11 +62,7 @@ the same."""
 class Evidence:
     """How well places beside a guide show a track.
 
-    Attributes
-    ----------
-    across : (c,) array
-        Distances of the places to the left of the guide, every `STEP_M`.
-    score : (sections, SLOPES, c) array
+    The places are `across`, (c,), to the left of the guide, every `STEP_M`; `score` is (sections, SLOPES, c).
     """
 
     across: np.ndarray
@@ -79,15 +75,11 @@ class Evidence:
 
 
 @dataclass(frozen=True)
-class Course:
-    """A course beside a guide.
+class GuideCourse:
+    """A course beside a guide, (sections,) arrays.
 
-    Attributes
-    ----------
-    across : (sections,) array
-        Distance to the left of the guide in the middle of each section of `SECTION_M`.
-    margin : (sections,) array
-        Score of this course above that of the best one that is elsewhere in the section.
+    `across` is its distance to the left of the guide in the middle of each section of `SECTION_M`, and `margin` its
+    score above that of the best course that is elsewhere in the section.
     """
 
     across: np.ndarray
@@ -99,7 +91,7 @@ def slopes() -> np.ndarray:
     return (np.arange(SLOPES) - SLOPES // 2) * SLOPE_STEP
 
 
-def evidence(corridor: Corridor, reach_m: float, shape: Shape) -> Evidence:
+def evidence(corridor: Corridor, reach_m: float, shape: RidgeShape) -> Evidence:
     """Weigh every place within reach of the axis in every section."""
     half, places = int(round(HALF_M / STEP_M)), 2 * int(round(reach_m / STEP_M)) + 1
     width = 2 * half + 1
@@ -127,7 +119,7 @@ def guide_prior(across: np.ndarray, sections: int) -> np.ndarray:
     return np.tile(-0.5 * (across / GUIDE_M) ** 2 * SECTION_M / GUIDE_LENGTH_M, (sections, 1))
 
 
-def trace(found: Evidence, prior: np.ndarray) -> Course:
+def trace(found: Evidence, prior: np.ndarray) -> GuideCourse:
     """Find the course with the largest sum of evidence and prior, (sections, c), less the cost of its turns."""
     score = found.score + prior[:, None, :]
     ahead, back = _Move(len(found.across), 1), _Move(len(found.across), -1)
@@ -147,7 +139,7 @@ def trace(found: Evidence, prior: np.ndarray) -> Course:
     across = found.across[np.array(states[::-1]) % len(found.across)]
     marginal = np.array([(one + other).max(axis=0) for one, other in zip(best, rest[::-1])])
     elsewhere = np.where(np.abs(found.across - across[:, None]) > APART_M, marginal, IMPOSSIBLE).max(axis=1)
-    return Course(across, marginal.max(axis=1) - elsewhere)
+    return GuideCourse(across, marginal.max(axis=1) - elsewhere)
 
 
 class _Move:
@@ -177,15 +169,8 @@ class _Move:
         return found, source + aside.ravel()[source] - 1
 
 
-def courses(axes: Sequence[Polyline], found: Sequence[Evidence]) -> tuple[list[Course], list[np.ndarray]]:
-    """Find the courses of parallel tracks.
-
-    Returns
-    -------
-    list of Course
-    list of (sections, c) arrays
-        Score of each place together with that of the neighbours, for `certainty`.
-    """
+def courses(axes: Sequence[Polyline], found: Sequence[Evidence]) -> tuple[list[GuideCourse], list[np.ndarray]]:
+    """Find the courses of parallel tracks, and the score, (sections, c), of each place together with its neighbours."""
     together = [one.best + _support(number, axes, found) for number, one in enumerate(found)]
     joined = []
     for one, score in zip(found, together):
@@ -229,15 +214,9 @@ def _support(number: int, axes: Sequence[Polyline], found: Sequence[Evidence]) -
 
 
 def parallel(place: np.ndarray, normal: np.ndarray, other: Polyline) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return beside which places, (n, 2), with unit vectors to the left, (n, 2), another line is parallel.
+    """Return where another line is parallel, given places, (n, 2), with unit vectors to the left: three (n,) arrays.
 
-    Returns
-    -------
-    parallel : (n,) bool array
-    t : (n,) array
-        Chainage of the other line there.
-    opposite : (n,) bool array
-        Whether it runs the other way.
+    They are whether it is parallel, the chainage of the other line there, and whether it runs the other way.
     """
     distance, nearest = cKDTree(other.xy).query(place, distance_upper_bound=FAR_M)
     near = np.isfinite(distance)
@@ -255,14 +234,10 @@ def _blurred(score: np.ndarray) -> np.ndarray:
     return (windows(padded, 2 * aside + 1) - 0.5 * (step / OWN_M) ** 2).max(axis=-1)
 
 
-def certainty(course: Course, score: np.ndarray, across: np.ndarray) -> np.ndarray:
+def certainty(course: GuideCourse, score: np.ndarray, across: np.ndarray) -> np.ndarray:
     """Return how likely the guide means this track and not another one within reach, (sections,).
 
-    Parameters
-    ----------
-    score : (sections, c) array
-        Together with the neighbours.
-    across : (c,) array
+    `score`, (sections, c), is that of each place in `across`, (c,), together with the neighbours.
     """
     kernel = np.ones(min(RIVAL_SECTIONS, len(score)))
     mean = np.column_stack([np.convolve(one, kernel / len(kernel), "same") for one in score.T])

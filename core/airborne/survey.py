@@ -1,4 +1,4 @@
-"""Tracks along guides as they are written: stations every 10 m, and lines where a track is seen."""
+"""Tracks along guides as they are written, stations every 10 m and lines where a track is seen, and what a run says."""
 
 from __future__ import annotations
 
@@ -8,11 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from ..errors import CloudError
 from ..frame import LocalFrame
+from ..parameters import AirborneParameters
 from ..polyline import length_along
-from ..standards import GAUGE_RANGE_MM
-from .cross_sections import STATION_M
-from .fitting import BED_SIGMA_M, REASONS, SEEN, Stations
+from ..standards import GAUGE_RANGE_MM, STANDARDS
+from .fitting import BED_SIGMA_M, REASONS, SEEN, Fitted, TrackStations
+from .ridges import STATION_M, RidgeShape
 
 MAX_UNSEEN_M, LEAST_STATIONS = 30.0, 3
 """A line ends where its track is not seen for longer, and is none with fewer stations that are."""
@@ -29,19 +31,34 @@ MAX_RADIUS_M = 10_000.0
 SAME_OTHER_M = 1.0
 """Places of a track without a guide whose distances differ by less belong to the same one."""
 
+MOBILE_DENSITY = 500.0
+"""Points per square metre above which single railheads show, and Extract Rails is better: clouds from aeroplanes have
+up to 100, lidar from drones up to 400."""
+
+SPARSE_DENSITY, WIDE_FOOTPRINT_M = 5.0, 0.4
+"""Below this density, a footprint this wide hides the rails in too many sections."""
+
+FLIGHT = (
+    "The standard errors are those of the fit. They leave out the error of the flight itself against its datum, often "
+    "3 to 10 cm: compare with control points."
+)
+
+WIDE_RIDGES = 1.6
+"""Ridges this much wider than the footprint makes them are warned of."""
+
+KNOWN_M = 0.045
+"""A gauge that the points show means the nearest one of a rail standard, if it is this close."""
+
+FEW_GUIDES = 5
+"""A sentence names no more guides than this."""
+
 
 @dataclass(frozen=True)
-class Guide:
-    """A line that says which track is meant.
+class GuideLine:
+    """A line, `xy` (n, 2) in units of the cloud's coordinate system, that says which track is meant.
 
-    Attributes
-    ----------
-    xy : (n, 2) array
-        Units of the cloud's coordinate system.
-    gauge_m : float or None
-        Gauge of this track, such as OpenStreetMap states it; None for that of the run.
-    name, ref : str
-        What the layer says of it, which is carried over.
+    `gauge_m` is the gauge of this track, such as OpenStreetMap states it; None for that of the run. `name` and `ref`
+    are carried over from the layer.
     """
 
     guide_id: int
@@ -68,15 +85,7 @@ def gauge_of(text: object) -> float | None:
 
 @dataclass(frozen=True)
 class OtherTrack:
-    """A track beside another one, without a guide.
-
-    Attributes
-    ----------
-    first_m, last_m : float
-        Chainages along the guide.
-    left_m : float
-        Mean distance to the left.
-    """
+    """A track without a guide, on average `left_m` to the left of another one, between two chainages of the guide."""
 
     first_m: float
     last_m: float
@@ -110,7 +119,7 @@ class AirborneTrack:
         Why a station is not seen; empty where it is.
     """
 
-    guide: Guide
+    guide: GuideLine
     track_id: np.ndarray
     xyz: np.ndarray
     s_m: np.ndarray
@@ -143,13 +152,7 @@ class AirborneTrack:
 
 @dataclass(frozen=True)
 class AirborneLine:
-    """A centerline where its track is seen; fields as in `fields.AIRBORNE_FIELDS`.
-
-    Attributes
-    ----------
-    xyz : (n, 3) array
-        Local metres.
-    """
+    """A centerline, `xyz` (n, 3) local metres, where its track is seen; fields as in `fields.AIRBORNE_FIELDS`."""
 
     xyz: np.ndarray
     track_id: int
@@ -165,16 +168,8 @@ class AirborneLine:
 
 
 @dataclass(frozen=True)
-class Survey:
-    """What a run has found.
-
-    Attributes
-    ----------
-    tracks : tuple of AirborneTrack
-        One for each guide.
-    density : float
-        Points per square metre along the guides.
-    """
+class AirborneSurvey:
+    """What a run has found: a track for each guide, its lines, and the points per square metre along the guides."""
 
     tracks: tuple[AirborneTrack, ...]
     lines: tuple[AirborneLine, ...]
@@ -194,8 +189,8 @@ class Survey:
 
 
 def track_of(
-    guide: Guide,
-    stations: Stations,
+    guide: GuideLine,
+    stations: TrackStations,
     spacing_m: float,
     rail_height_m: float,
     frame: LocalFrame,
@@ -259,12 +254,7 @@ def lines_of(
 ) -> tuple[tuple[AirborneTrack, ...], tuple[AirborneLine, ...]]:
     """Draw the lines of tracks where they are seen, and number the stations by them.
 
-    Parameters
-    ----------
-    gauge_mm : float
-        That of the run, for guides that state none.
-    hints : bool
-        Whether the cloud is too sparse for more.
+    `gauge_mm` is for guides that state none; with `hints` the cloud is too sparse for more.
     """
     numbered: list[AirborneTrack] = []
     lines: list[AirborneLine] = []
@@ -326,3 +316,76 @@ def joined_others(places: np.ndarray) -> tuple[OtherTrack, ...]:
         else:
             found.append(OtherTrack(t, t, left))
     return tuple(found)
+
+
+def refuse_mobile(density: float) -> None:
+    """Raise `CloudError` for a cloud in whose points per square metre single railheads show."""
+    if density > MOBILE_DENSITY:
+        raise CloudError(
+            f"The cloud has {density:.0f} points per square metre, as mobile lidar and dense drone surveys have: use "
+            "Extract Rails, which finds the single railheads and is more accurate there."
+        )
+
+
+def are_hints(density: float, parameters: AirborneParameters) -> bool:
+    """Return whether lines in a cloud with this many points per square metre are only hints."""
+    return density < SPARSE_DENSITY and parameters.footprint_m > WIDE_FOOTPRINT_M
+
+
+def on_density(density: float, parameters: AirborneParameters) -> list[str]:
+    """Warn of a cloud that is too sparse for its footprint."""
+    if not are_hints(density, parameters):
+        return []
+    return [
+        f"The cloud has {density:.1f} points per square metre, too few for a footprint of "
+        f"{parameters.footprint_m:g} m: take the lines as hints."
+    ]
+
+
+def on_shapes(found: Sequence[Fitted], parameters: AirborneParameters, spacings_m: Sequence[float]) -> list[str]:
+    """Warn of ridges that do not fit the footprint."""
+    shapes = [one.shape for one in found if one.shape is not None and (one.stations.reason == SEEN).any()]
+    if not shapes:
+        return []
+    width_m = float(np.median([shape.width_m for shape in shapes]))
+    expected_m = RidgeShape.expected(spacings_m[0], parameters.footprint_m).width_m
+    if width_m < WIDE_RIDGES * expected_m:
+        return []
+    return [
+        f"The rails show as ridges with a standard deviation of {1000 * width_m:.0f} mm, wider than a footprint of "
+        f"{parameters.footprint_m:g} m makes them: set the footprint of the scanner."
+    ]
+
+
+def on_gauges(
+    guides: Sequence[GuideLine], fitted: Sequence[Sequence[Fitted]], parameters: AirborneParameters
+) -> list[str]:
+    """Warn of guides along which rails at another gauge show, one sentence for those that share both gauges."""
+    wrong: dict[tuple[int, int, bool], list[int]] = {}
+    for guide, parts in zip(guides, fitted):
+        shown = [one.shown_m for one in parts if np.isfinite(one.shown_m)]
+        if 2 * len(shown) > len(parts):
+            stated_mm = round(1000 * (guide.gauge_m or parameters.gauge_m))
+            shown_mm = _nearest_gauge(float(np.median(shown)) - parameters.head_width_m)
+            if shown_mm != stated_mm:
+                wrong.setdefault((shown_mm, stated_mm, guide.gauge_m is not None), []).append(guide.guide_id)
+    return [
+        f"Along {_guides(ids)}, rails with a gauge of about {shown_mm} mm show, not {stated_mm} mm as "
+        + ("its field gauge states: correct it." if own else "the rail standard states: choose another.")
+        for (shown_mm, stated_mm, own), ids in wrong.items()
+    ]
+
+
+def _nearest_gauge(gauge_m: float) -> int:
+    """Return the gauge of a rail standard next to a measured one, millimetres, or this one rounded."""
+    known_m = min((one.gauge_m for one in STANDARDS.values()), key=lambda one: abs(one - gauge_m))
+    return round(1000 * known_m) if abs(known_m - gauge_m) < KNOWN_M else 10 * round(100 * gauge_m)
+
+
+def _guides(ids: Sequence[int]) -> str:
+    ids = list(dict.fromkeys(ids))
+    if len(ids) == 1:
+        return f"guide {ids[0]}"
+    if len(ids) > FEW_GUIDES:
+        return f"{len(ids)} guides, such as guide {ids[0]}"
+    return f"guides {', '.join(map(str, ids[:-1]))} and {ids[-1]}"

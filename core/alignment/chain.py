@@ -34,20 +34,12 @@ ROOM_SHARE = 0.45
 
 @dataclass(frozen=True)
 class Samples:
-    """The signal as means over blocks.
+    """The signal as means over blocks, (n,) arrays: mean distance and mean signal, metres.
 
-    Attributes
-    ----------
-    s, y : (n,) array
-        Mean distance and mean signal of a block, metres.
-    spread : (n,) array
-        Variance of the distance within the block, square metres: the mean of a bent signal is off by half of it times
-        the bend.
-    variance : (n,) array
-        Of what is independent in the mean, square metres.
-    factor : (b, n) array, optional
-        Cholesky factor of the covariance of the means, in the lower form of banded matrices, metres; None if neighbours
-        share no errors.
+    `spread` is the variance of the distance within the block: the mean of a bent signal is off by half of it times the
+    bend. `variance` is that of what is independent in the mean, both square metres. `factor`, (b, n), is the Cholesky
+    factor of the covariance of the means, in the lower form of banded matrices, metres; None if neighbours share no
+    errors.
     """
 
     s: np.ndarray
@@ -68,20 +60,11 @@ class Samples:
 
 @dataclass(frozen=True)
 class Chain:
-    """Parts of constant bend and the joints between them, from `start` to `end`.
+    """Parts of constant bend and the joints between them, from `start` to `end`; lengths in metres.
 
-    Attributes
-    ----------
-    start, end : float
-        Distances, metres.
-    bends : (m,) array
-        Bend of each part, 1/m.
-    curved : tuple of bool
-        Whether the bend of the part is free; else it is 0.
-    p, q : (m - 1,) array
-        Start and end of each joint, metres. Equal values are one unknown; a value equal to `start` or `end` is fixed.
-    order : int
-        How many times the bend is integrated.
+    `bends`, (m,), is the bend of each part, 1/m; where it is not `curved`, it is 0. `p` and `q`, (m - 1,), are start
+    and end of each joint: equal values are one unknown; a value equal to `start` or `end` is fixed. `order` is how many
+    times the bend is integrated.
     """
 
     start: float
@@ -123,16 +106,9 @@ class Chain:
 
 @dataclass(frozen=True)
 class Held:
-    """What is held in a fit.
+    """What is held in a fit: bends of parts, 1/m, and starts and lengths of elements, metres, by their numbers.
 
-    Attributes
-    ----------
-    bends : mapping of int to float
-        Bend of parts of the chain by their number, 1/m.
-    starts : mapping of int to float
-        Where elements start, by their number, metres; one past the last stands for the end.
-    lengths : mapping of int to float
-        Lengths of elements, by their number, metres.
+    A start one past the last stands for the end.
     """
 
     bends: Mapping[int, float] = field(default_factory=dict)
@@ -145,18 +121,10 @@ NOTHING = Held()
 
 @dataclass(frozen=True)
 class Span:
-    """A part of a chain that is to be assembled, or a ramp between two parts.
+    """A part of a chain that is to be assembled, or a ramp between two parts, from `start` to `end`, metres.
 
-    Attributes
-    ----------
-    start, end : float
-        Distances, metres.
-    curved : bool
-        Whether the bend of a part is free.
-    bend : float
-        Of a part; of a ramp, that at its end.
-    before : float
-        Bend at the start of a ramp.
+    `curved` says whether the bend of a part is free; `bend` is that of a part or at the end of a ramp, `before` that at
+    the start of a ramp.
     """
 
     start: float
@@ -227,14 +195,9 @@ def columns(chain: Chain, samples: Samples) -> tuple[np.ndarray, np.ndarray]:
 class Unknowns:
     """What a fit of a chain finds.
 
-    Attributes
-    ----------
-    free : (order + m,) bool array
-        Whether the values at the start and the bends are found.
-    bends : (m,) array
-        Bends that are not: 0, or as they are held, 1/m.
-    knots : (2 m - 2,) int array
-        Number of the unknown of each knot but the ends; -1 where it is fixed or held.
+    `free`, (order + m,), says whether the values at the start and the bends are found; the other `bends`, (m,), are 0
+    or held, 1/m. `knots`, (2 m - 2,), is the number of the unknown of each knot but the ends; -1 where it is fixed or
+    held.
     """
 
     free: np.ndarray

@@ -122,12 +122,8 @@ class Stretch:
 class PlanElement(Stretch):
     """Line, arc or clothoid: the curvature changes linearly from start to end.
 
-    Attributes
-    ----------
-    x, y, heading : float
-        Start in local metres, and direction there in radians, counterclockwise from the x axis.
-    k_from, k_to : float
-        Curvature at start and end in 1/m, positive to the left.
+    It starts at `x` and `y`, local metres, with the direction `heading`, radians counterclockwise from the x axis;
+    curvatures are in 1/m, positive to the left.
     """
 
     layout: ClassVar[str] = "H"
@@ -148,15 +144,7 @@ class PlanElement(Stretch):
 
 @dataclass(frozen=True)
 class VerticalElement(Stretch):
-    """Grade or parabola: the gradient changes linearly with `s`.
-
-    Attributes
-    ----------
-    z : float
-        Height of the start, local metres.
-    grade_from, grade_to : float
-        Gradient at start and end, metres per metre, positive uphill.
-    """
+    """Grade or parabola from the height `z`, local metres: the gradient, positive uphill, changes linearly with `s`."""
 
     layout: ClassVar[str] = "V"
     z: float
@@ -183,13 +171,7 @@ class VerticalElement(Stretch):
 
 @dataclass(frozen=True)
 class CantElement(Stretch):
-    """Constant cant or a ramp: the cant changes linearly with `s`.
-
-    Attributes
-    ----------
-    cant_from_m, cant_to_m : float
-        Cant at start and end in metres, left rail minus right rail.
-    """
+    """Constant cant or a ramp: the cant, left rail minus right rail, changes linearly with `s`."""
 
     layout: ClassVar[str] = "C"
     cant_from_m: float
@@ -213,16 +195,11 @@ Element = Union[PlanElement, VerticalElement, CantElement]
 
 @dataclass(frozen=True)
 class Foot:
-    """Nearest places of an alignment to given points.
+    """Nearest places of an alignment to n given points, (n,) arrays, metres.
 
-    Attributes
-    ----------
-    s : (n,) array
-        Distance along the curve, never beyond its ends.
-    across_m : (n,) array
-        Distance of the point from the curve, positive to the left.
-    past_m : (n,) array
-        How far the point is ahead of the foot: 0 except before the start (negative) and after the end (positive).
+    `s` is the distance along the curve, never beyond its ends, and `across_m` that of the point from the curve,
+    positive to the left. `past_m` is how far the point is ahead of the foot: 0 except before the start (negative) and
+    after the end (positive).
     """
 
     s: np.ndarray
@@ -234,21 +211,9 @@ class Foot:
 class Alignment:
     """The design of one track: elements in plan, and in height and cant as far as they are known.
 
-    Elements of one layout follow each other in order of `s` without gaps. Every element states its own start; the curve
-    is evaluated from there, so that elements of a file that do not quite meet are shown as they are.
-
-    Attributes
-    ----------
-    frame : LocalFrame
-        Of the places; it knows the coordinate system.
-    plan : tuple of PlanElement
-        At least one.
-    vertical : tuple of VerticalElement
-        Empty if heights are unknown.
-    cant : tuple of CantElement
-        Empty if the cant is unknown.
-    name : str
-        Of the track, as a file states it.
+    Elements of one layout follow each other in order of `s` without gaps; there is at least one in plan. Every element
+    states its own start; the curve is evaluated from there, so that elements of a file that do not quite meet are shown
+    as they are. The frame of the places knows the coordinate system; `name` is that of the track, as a file states it.
     """
 
     track_id: Optional[int]

@@ -15,14 +15,27 @@ from ..parameters import JUMPS, FitParameters
 from ..polyline import Polyline, runs
 from ..progress import SILENT, Progress
 from .chain import Chain
-from .deviations import Deviations, deviations_of
 from .elements import Alignment, Element, PlanElement
-from .held import Given, given_along, given_of, moved, noted, off_element, with_round_radii, without
-from .layouts import cants, chain_errors, heights, on_clothoids, plan_errors, remaining
-from .measured import LEAST_POINTS, Measured, Track, lateral_signal, measured_of
+from .layouts import (
+    Given,
+    cants,
+    chain_errors,
+    given_along,
+    given_of,
+    heights,
+    moved,
+    noted,
+    off_element,
+    on_clothoids,
+    plan_errors,
+    remaining,
+    with_round_radii,
+    without,
+)
+from .measured import LEAST_POINTS, Deviations, Measured, Track, deviations_of, lateral_signal, measured_of
 from .noise import Noise, strays
-from .plane_fit import FitError, PlanFit, Points, fit_plan
-from .signals import CANT, HEIGHT, PLAN, Kind, Signal, find_structure, noise_of, refitted
+from .plane_fit import FitError, MeasuredLine, PlanFit, fit_plan
+from .signals import CANT, HEIGHT, PLAN, Signal, SignalKind, find_structure, noise_of, refitted
 
 HOLDS = 3.0
 """A fit does not hold where the line is off by more than this many tolerances, as a root mean square."""
@@ -44,15 +57,7 @@ LEAST_CANT_POINTS = 20
 
 @dataclass(frozen=True)
 class Fit:
-    """The alignment of a track.
-
-    Attributes
-    ----------
-    rms_mm : float
-        Root mean square of the slews.
-    noise : Noise
-        What is left of the points' distances from the curve.
-    """
+    """The alignment of a track, the root mean square of the slews, and the noise of the points' distances from it."""
 
     alignment: Alignment
     deviations: Deviations
@@ -69,12 +74,8 @@ def fit_track(
 ) -> Fit:
     """Fit the design elements of a track; warn where the fit does not hold.
 
-    The types of `fixed` elements are held, and the radii and ends that were edited.
-
-    Raises
-    ------
-    ParameterError
-        The line cannot have an alignment, or no part of the fit holds.
+    The types of `fixed` elements are held, and the radii and ends that were edited. Raises ParameterError if the line
+    cannot have an alignment, or no part of the fit holds.
     """
     measured = measured_of(track, HOLDS * settings.tolerance_m, progress)
     in_plan, in_height, of_cant = progress.divide([4.0, 1.0, 1.0])
@@ -100,12 +101,9 @@ def fit_tracks(
     fixed: Mapping[Optional[int], Alignment],
     progress: Progress = SILENT,
 ) -> list[Fit]:
-    """Fit the design elements of tracks; those that cannot have any are named and left out. See `fit_track`.
+    """Fit the design elements of tracks; those that cannot have any are named and left out.
 
-    Raises
-    ------
-    ParameterError
-        No track can have an alignment, or `fixed`, elements by track, has none of the tracks.
+    Raises ParameterError if no track can have an alignment, or `fixed`, elements by track, has none of the tracks.
     """
     if fixed and not any(track.track_id in fixed for track in tracks):
         raise ParameterError("FIXED has no elements of the tracks in INPUT: give the table of these tracks.")
@@ -141,7 +139,7 @@ class _Plan:
 
     chain: Chain
     fit: PlanFit
-    points: Points
+    points: MeasuredLine
     used_m: float
     noise: Noise
 
@@ -194,7 +192,7 @@ def _fit_in_plan(
         given = given_of(fixed, float(measured.along[0]), float(s[-1]))
         used = noise_of(signal, settings.tolerance_m, progress)[0]
     used_m = used.effective_m(signal.step_m)
-    points = Points(measured.xyz[:, :2], s, measured.in_plan / used_m**2)
+    points = MeasuredLine(measured.xyz[:, :2], s, measured.in_plan / used_m**2)
     try:
         fit = fit_plan(given.chain, points, given.held, progress, given.poses)
         while fixed is None:
@@ -316,7 +314,7 @@ def _with_cants(
     return replace(alignment, cant=cants(chain, signal, used, errors))
 
 
-def _signal(alignment: Alignment, s: np.ndarray, values: np.ndarray, share: np.ndarray, kind: Kind) -> Signal:
+def _signal(alignment: Alignment, s: np.ndarray, values: np.ndarray, share: np.ndarray, kind: SignalKind) -> Signal:
     """Return values along the design, where their points count."""
     inside = np.clip(s, alignment.s_from, alignment.s_to)
     used = (np.abs(s - inside) < AT_END_M) & (share > 0)

@@ -1,22 +1,24 @@
-"""Measured tracks: what a fit is given, its cant, and the points that count, as a signal of one variable.
+"""Measured tracks: what a fit is given, its cant, and the points that count; and how far tracks lie off alignments.
 
-The direction of a chord is that of the curve at its middle. Its sum along the line, y, therefore has the curvature as
-its second derivative, for any turn: a line is a polynomial of degree 1, an arc of degree 2, a clothoid of degree 3.
-Lateral errors of the points appear in y as they are.
+The points are a signal of one variable. The direction of a chord is that of the curve at its middle. Its sum along the
+line, y, therefore has the curvature as its second derivative, for any turn: a line is a polynomial of degree 1, an arc
+of degree 2, a clothoid of degree 3. Lateral errors of the points appear in y as they are.
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Optional
 
 import numpy as np
 
-from ..errors import ParameterError
+from ..errors import ParameterError, RailExtractError
 from ..polyline import Polyline, distance_to, runs
 from ..progress import Progress, counted
+from .elements import Alignment
 from .noise import strays
+from .stations import SAME_PLACE_M
 
 LEAST_TRACK_M, LEAST_POINTS = 50.0, 20
 """Least length of a track, metres, and least number of its points: the shortest curve that has a radius."""
@@ -31,20 +33,17 @@ STATION_NEEDS = ("track_id", "chainage_m", "cant_mm")
 TURNS_BACK_RAD = np.pi / 3.0
 """Largest bend of a line at a vertex: a track that turns back has a stray vertex, or runs through a switch twice."""
 
+OFF_TRACK_M = 2.0
+"""Largest median distance of a track from its alignment, metres: that of its neighbour is at least 3.4 m away."""
+
 
 @dataclass(frozen=True)
 class Track:
-    """A measured track.
+    """A measured track: vertices of the centerline, `xyz` (n, 3), local metres.
 
-    Attributes
-    ----------
-    xyz : (n, 3) array
-        Vertices of the centerline, local metres.
-    cant : (k, 2) array
-        Plan distance from the first vertex, increasing, and cant there, left rail minus right rail; metres. Empty if it
-        is unknown.
-    is_bridged : (n,) bool array
-        Whether the line bridges a gap at the vertex; such vertices do not count.
+    `cant`, (k, 2), holds the plan distance from the first vertex, increasing, and the cant there, left rail minus right
+    rail, metres; it is empty if the cant is unknown. Vertices at which the line bridges a gap, `is_bridged` (n,), do
+    not count.
     """
 
     track_id: int
@@ -66,10 +65,7 @@ def with_stations(track_id: int, xyz: np.ndarray, stations: np.ndarray) -> Track
 def stations_by_track(rows: Iterable[Mapping[str, Any]], fields: Collection[str], name: str) -> dict[int, np.ndarray]:
     """Return chainage, cant and whether a gap is bridged of the stations of each track, (n, 3); NaN without cant.
 
-    Raises
-    ------
-    ParameterError
-        A field is missing in the layer of this name.
+    Raises ParameterError if a field is missing in the layer of this name.
     """
     lacking = next((one for one in STATION_NEEDS if one not in fields), None)
     if lacking:
@@ -90,10 +86,7 @@ def with_cant(
 ) -> list[Track]:
     """Return tracks, given by number and vertices, with the cant of their stations.
 
-    Raises
-    ------
-    ParameterError
-        No track has stations; `quality` and `tracks` are the parameters that the message names.
+    Raises ParameterError if no track has stations; `quality` and `tracks` are the parameters that the message names.
     """
     if not any(number in stations for number, _ in lines):
         raise ParameterError(f"{quality} has no stations of the tracks in {tracks}: give their track geometry.")
@@ -103,17 +96,11 @@ def with_cant(
 
 @dataclass(frozen=True)
 class Measured:
-    """Points of a track, or of a part of it: its vertices, those averaged that are closer than a metre.
+    """Points of a track, or of a part of it: its vertices, those averaged that are closer than a metre; `xyz` (n, 3).
 
-    Attributes
-    ----------
-    xyz : (n, 3) array
-    along : (n,) array
-        Plan distance from the first vertex of the track along the line.
-    share : (n,) array
-        Number of vertices in each point that do not bridge a gap.
-    is_stray : (n, 2) bool array
-        Whether a point lies off its neighbours, so that it does not count: in plan, in height.
+    `along`, (n,), is the plan distance from the first vertex of the track, and `share`, (n,), the number of vertices in
+    each point that do not bridge a gap. `is_stray`, (n, 2), says whether a point lies off its neighbours, so that it
+    does not count: in plan, in height.
     """
 
     xyz: np.ndarray
@@ -267,3 +254,85 @@ def cant_of_rails(line: np.ndarray, rails: Sequence[np.ndarray]) -> np.ndarray:
     cant = sides[0] - sides[1]
     known = np.isfinite(cant)
     return np.column_stack([t[known], cant[known]])
+
+
+@dataclass(frozen=True)
+class Deviations:
+    """How far a track lies off its design, by the metre.
+
+    `s`, (n,), is the distance along the design, metres, and `xyz`, (n, 3), the place on it, local metres. Slew, lift
+    and difference of the cant, (n,), are measured minus design: across, positive to the left, and in height; NaN where
+    unknown.
+    """
+
+    track_id: Optional[int]
+    s: np.ndarray
+    xyz: np.ndarray
+    slew_mm: np.ndarray
+    lift_mm: np.ndarray
+    cant_diff_mm: np.ndarray
+
+
+def beside(alignments: Sequence[Alignment], xy: np.ndarray) -> Optional[Alignment]:
+    """Return the alignment along which a line with vertices, (n, 2) local metres, lies; None if it lies along none."""
+    distances = [(_distance_m(alignment, xy), number) for number, alignment in enumerate(alignments)]
+    nearest_m, number = min(distances, default=(np.inf, 0))
+    return alignments[number] if nearest_m <= OFF_TRACK_M else None
+
+
+def _distance_m(alignment: Alignment, xy: np.ndarray) -> float:
+    """Return the median distance of a line from an alignment; infinite if it lies past its ends."""
+    foot = alignment.foot(xy)
+    inside = foot.past_m == 0
+    return float(np.median(np.abs(foot.across_m[inside]))) if np.count_nonzero(inside) > 1 else np.inf
+
+
+def compared_with(
+    alignments: Sequence[Alignment], tracks: Sequence[Track], progress: Progress
+) -> list[tuple[Alignment, Deviations]]:
+    """Return the deviations of each track, in the frame of the alignments, with the alignment beside it.
+
+    Raises RailExtractError if none lies along an alignment; of some that do not, the user is told.
+    """
+    found, lost = [], []
+    for track in tracks:
+        alignment = beside(alignments, track.xyz[:, :2])
+        if alignment is None:
+            lost.append(str(track.track_id))
+            continue
+        along = Polyline(track.xyz).t
+        found.append((alignment, deviations_of(alignment, track.track_id, track.xyz, along, track.cant)))
+    if not found:
+        raise RailExtractError("None of TRACKS lies along an alignment of INPUT: check the coordinate system of both.")
+    if lost:
+        progress.warning(f"Tracks {', '.join(lost)} do not lie along an alignment: they are left out.")
+    return found
+
+
+def deviations_of(
+    alignment: Alignment, track_id: Optional[int], xyz: np.ndarray, along: np.ndarray, cant: np.ndarray
+) -> Deviations:
+    """Return how far a line, `xyz` (n, 3) in local metres, lies off an alignment, interpolated between its vertices.
+
+    Some vertices may lie beside the alignment, and the line may run against it. `along`, (n,), is the plan distance of
+    the vertices from the first one; `cant`, (k, 2), holds plan distance, increasing, and cant there, left rail minus
+    right rail along the line, metres; empty if it is unknown.
+    """
+    foot = alignment.foot(xyz[:, :2])
+    inside = foot.past_m == 0
+    used = inside.copy()  # and the first vertex past either end, which lies beside the continued end
+    used[1:] |= inside[:-1]
+    used[:-1] |= inside[1:]
+    order = np.argsort((foot.s + foot.past_m)[used], kind="stable")
+    feet, across, z = (values[used][order] for values in (foot.s + foot.past_m, foot.across_m, xyz[:, 2]))
+    first, last = max(feet[0], alignment.s_from), min(feet[-1], alignment.s_to)
+    s = np.arange(np.ceil(first - SAME_PLACE_M), np.floor(last + SAME_PLACE_M) + 1.0)
+    slew, lift = (np.interp(s, feet, values) for values in (across, z - alignment.heights(feet)))
+    turned = foot.s[-1] < foot.s[0]
+    cant_diff = np.full(len(s), np.nan)
+    if len(cant):
+        at = np.interp(cant[:, 0], along, foot.s)
+        diff = np.where(turned, -cant[:, 1], cant[:, 1]) - alignment.cants(at)
+        order = np.argsort(at, kind="stable")
+        cant_diff = np.interp(s, at[order], diff[order], left=np.nan, right=np.nan)
+    return Deviations(track_id, s, alignment.xyz(s), 1000 * slew, 1000 * lift, 1000 * cant_diff)

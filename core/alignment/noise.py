@@ -42,16 +42,10 @@ SIZES = (8, 12, 18, 27, 40, 60, 90, 135, 200)
 
 @dataclass(frozen=True)
 class Noise:
-    """The errors of a signal.
+    """The errors of a signal, metres.
 
-    Attributes
-    ----------
-    white_m : float
-        Standard deviation of the errors of single points that are independent of each other, metres.
-    shared_m : float
-        Standard deviation of the misalignment, metres.
-    length_m : float
-        Distance at which the correlation of the misalignment has fallen to 1/e, metres.
+    `white_m` is the standard deviation of the errors of single points that are independent of each other, `shared_m`
+    that of the misalignment, and `length_m` the distance at which its correlation has fallen to 1/e.
     """
 
     white_m: float
@@ -126,21 +120,14 @@ def strays(s: np.ndarray, y: np.ndarray, limit_m: float) -> np.ndarray:
 
 
 def estimated(pieces: Sequence[tuple[np.ndarray, float]], step_m: float, floor_m: float, sure: float = 0.0) -> Noise:
-    """Return the noise that explains residuals.
+    """Return the noise that explains residuals of polynomials.
 
-    The residuals of a polynomial hang together less than the errors, because it follows them; the loss is computed.
+    A piece is its residuals in order, metres, and the degree of the polynomial that was fitted to it. Residuals hang
+    together less than the errors, because the polynomial follows them; the loss is computed. Between two degrees, as
+    much is lost as a share of the errors loses by either.
 
-    Parameters
-    ----------
-    pieces : sequence of ((n,) array, float)
-        Residuals of a piece in order, metres, and degree of the polynomial that was fitted to it. Between two degrees,
-        as much is lost as a share of the errors loses by either.
-    step_m : float
-        Mean distance between the points.
-    floor_m : float
-        Least standard deviation of single points, metres.
-    sure : float
-        Misalignment must exceed what chance explains by this many standard errors; with 0, it need not.
+    Points are `step_m` apart on average and err by at least `floor_m`. Misalignment must exceed what chance explains by
+    `sure` standard errors; with 0, it need not.
     """
     pieces = _usual([(rest, degree) for rest, degree in pieces if len(rest) >= SIZES[0]])
     if not pieces:

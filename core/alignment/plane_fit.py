@@ -60,17 +60,10 @@ RIDGE = 1e-9
 
 
 @dataclass(frozen=True)
-class Points:
-    """The measured line.
+class MeasuredLine:
+    """The measured line: `xy`, (n, 2) local metres, and the distance `s` along it, (n,).
 
-    Attributes
-    ----------
-    xy : (n, 2) array
-        Local metres.
-    s : (n,) array
-        Distance along the line.
-    weight : (n,) array
-        Inverse of the variance across, 1/m²; 0 where the line bridges a gap.
+    `weight`, (n,), is the inverse of the variance across, 1/m²; 0 where the line bridges a gap.
     """
 
     xy: np.ndarray
@@ -82,18 +75,10 @@ class Points:
 class PlanFit:
     """Elements that fit the points, with what the fit says about them.
 
-    Attributes
-    ----------
-    across : (n,) array
-        Distance of each point from the curve, positive to the left, metres.
-    s : (n,) array
-        Feet of the points.
-    nodes : (e, 2) int array
-        Number of the curvature at start and end of each element; -1 is 0.
-    jacobian : (n, u) sparse array
-        Derivatives of `across` with respect to the unknowns: poses, curvatures, lengths.
-    solver : _Solver
-        Of the equations of the last step.
+    `across` and `s`, (n,), are the distance of each point from the curve, positive to the left, and its foot, metres.
+    `nodes`, (e, 2), is the number of the curvature at start and end of each element; -1 is 0. `jacobian`, (n, u), holds
+    the derivatives of `across` with respect to the unknowns (poses, curvatures, lengths), and `solver` is that of the
+    equations of the last step.
     """
 
     elements: tuple[PlanElement, ...]
@@ -151,7 +136,7 @@ class _Solver:
 
 def fit_plan(
     chain: Chain,
-    points: Points,
+    points: MeasuredLine,
     held: Held = NOTHING,
     progress: Progress = SILENT,
     poses: Optional[np.ndarray] = None,
@@ -185,7 +170,7 @@ class _Look:
     held: Held
 
     @classmethod
-    def at(cls, state: _State, points: Points, feet: np.ndarray, held: Held) -> _Look:
+    def at(cls, state: _State, points: MeasuredLine, feet: np.ndarray, held: Held) -> _Look:
         seen = _seen(state, points, feet)
         to_the_end = replace(held, starts={**held.starts, len(state.length): float(seen[0][-1])})
         constraints, gaps = _with_held(*_constraints(state), state, to_the_end)
@@ -220,7 +205,7 @@ class _Look:
         """Return the numbers of the elements that a step makes shorter than the least length."""
         return np.flatnonzero(_taken(self.state, change)[0].length < least_m).tolist()
 
-    def stepped(self, points: Points, solver: _Solver, change: np.ndarray) -> tuple[Optional[_Look], float]:
+    def stepped(self, points: MeasuredLine, solver: _Solver, change: np.ndarray) -> tuple[Optional[_Look], float]:
         """Return the look after a change, None if it makes no sense, and the largest shift.
 
         Where the change does more harm than good, the gaps are closed that its curvature has opened.
@@ -235,7 +220,7 @@ class _Look:
         return after, moved
 
 
-def _settled(now: _Look, points: Points, progress: Progress) -> _Look:
+def _settled(now: _Look, points: MeasuredLine, progress: Progress) -> _Look:
     """Return the look from which no step leads to a better one."""
     ridge = RIDGE
     for _ in range(ROUNDS):
@@ -259,7 +244,7 @@ def _settled(now: _Look, points: Points, progress: Progress) -> _Look:
     return now
 
 
-def _closed(look: _Look, points: Points) -> _Look:
+def _closed(look: _Look, points: MeasuredLine) -> _Look:
     """Return a look in which elements meet, moved no more than that needs."""
     for _ in range(CLOSING_ROUNDS):
         if look.gap_m < CLOSED_M:
@@ -277,7 +262,7 @@ def _is_sane(state: _State) -> bool:
     return bool(np.isfinite(state.pose).all() and (np.abs(state.ends).max(axis=1) * state.length).max() < MOST_TURN_RAD)
 
 
-def _first_state(chain: Chain, points: Points, poses: Optional[np.ndarray]) -> _State:
+def _first_state(chain: Chain, points: MeasuredLine, poses: Optional[np.ndarray]) -> _State:
     """Return poses from the points or as they are given, and curvatures and lengths from the chain."""
     number = np.where(chain.curved, np.cumsum(chain.curved) - 1, -1)
     starts, ends = chain.extents
@@ -299,7 +284,7 @@ def _first_state(chain: Chain, points: Points, poses: Optional[np.ndarray]) -> _
     return state
 
 
-def _poses_on(points: Points, s: np.ndarray) -> np.ndarray:
+def _poses_on(points: MeasuredLine, s: np.ndarray) -> np.ndarray:
     """Return places and directions of the line, (e, 3)."""
     place, behind, ahead = (
         np.column_stack([np.interp(at, points.s, axis) for axis in points.xy.T])
@@ -309,7 +294,7 @@ def _poses_on(points: Points, s: np.ndarray) -> np.ndarray:
     return np.column_stack([place, np.arctan2(chord[:, 1], chord[:, 0])])
 
 
-def _seen(state: _State, points: Points, feet: np.ndarray) -> tuple[np.ndarray, np.ndarray, sparse.csr_matrix]:
+def _seen(state: _State, points: MeasuredLine, feet: np.ndarray) -> tuple[np.ndarray, np.ndarray, sparse.csr_matrix]:
     """Return feet, distances across, and the derivatives of these."""
     starts = state.starts
     for _ in range(2):

@@ -38,21 +38,12 @@ that goes on from the table of this one must find it in the same place."""
 
 
 @dataclass(frozen=True)
-class Kind:
+class SignalKind:
     """A kind of signal.
 
-    Attributes
-    ----------
-    order : int
-        How many times the bend is integrated.
-    degrees : tuple of int
-        Of the polynomials in the first partition.
-    ramps : bool
-        Whether the bend may change linearly.
-    least_m : float
-        Least standard deviation of the errors, metres.
-    shown_m : float
-        See `Rules`; where the line was smoothed.
+    `order` is how many times the bend is integrated, `degrees` are those of the polynomials in the first partition, and
+    `ramps` says whether the bend may change linearly. `least_m` is the least standard deviation of the errors, metres;
+    `shown_m` is that of `Rules`, where the line was smoothed.
     """
 
     order: int
@@ -67,35 +58,30 @@ class Kind:
 
 
 SMOOTH = 0.2
-"""Share of `Kind.shown_m` below which single points scatter only if the line was smoothed: errors of several lengths
-hang together then, and what the search takes for its noise is less than these."""
+"""Share of `SignalKind.shown_m` below which single points scatter only if the line was smoothed: errors of several
+lengths hang together then, and what the search takes for its noise is less than these."""
 
 LEAST_ERROR_M = 0.001
 """Least standard deviation of a line across and in height, metres: no survey of a track is better. Where single points
 scatter by less, the line was smoothed, and what their errors lack is shared by neighbours: the bends of a smooth error
 would be taken for elements."""
 
-PLAN, HEIGHT = Kind(2, (1, 2, 3), True, LEAST_ERROR_M), Kind(2, (1, 2), False, LEAST_ERROR_M)
-CANT = Kind(1, (0, 1), False, shown_m=math.sqrt(2.0) * LEAST_ERROR_M)
+PLAN, HEIGHT = SignalKind(2, (1, 2, 3), True, LEAST_ERROR_M), SignalKind(2, (1, 2), False, LEAST_ERROR_M)
+CANT = SignalKind(1, (0, 1), False, shown_m=math.sqrt(2.0) * LEAST_ERROR_M)
 """Kinds of signals. Cant is the difference of two heights."""
 
 
 @dataclass(frozen=True)
 class Signal:
-    """A signal along a track.
+    """A signal along a track, (n,) arrays: distance and value, metres, and how much each point counts.
 
-    Attributes
-    ----------
-    s, y : (n,) array
-        Distance and value, metres.
-    share : (n,) array
-        How much each point counts, 1 for a measured one, 0 in a bridged gap.
+    `share` is 1 for a measured point, 0 in a bridged gap.
     """
 
     s: np.ndarray
     y: np.ndarray
     share: np.ndarray
-    kind: Kind
+    kind: SignalKind
 
     @property
     def step_m(self) -> float:
@@ -220,15 +206,7 @@ LONGEST_M = 1500.0
 
 @dataclass(frozen=True)
 class Polynomial:
-    """A piece of the signal.
-
-    Attributes
-    ----------
-    start, end : float
-        Distances, metres.
-    degree : int
-        Of its polynomial.
-    """
+    """A piece of the signal between two distances, metres, and the degree of its polynomial."""
 
     start: float
     end: float

@@ -25,16 +25,9 @@ SAME_PLACE_M = 1e-4
 
 @dataclass(frozen=True)
 class StationRange:
-    """A part of the curve on which stations continue.
+    """A part of the curve on which stations continue: it starts at `s` along the curve with `station`, both metres.
 
-    Attributes
-    ----------
-    s : float
-        Its start, metres along the curve.
-    station : float
-        Station of its start, metres.
-    rises : bool
-        Whether stations rise along the curve.
+    `rises` says whether stations rise along the curve.
     """
 
     s: float
@@ -48,12 +41,7 @@ class StationRange:
 
 @dataclass(frozen=True)
 class Stations:
-    """The stations along a curve.
-
-    Attributes
-    ----------
-    pieces : tuple of StationRange
-        At least one, in order of `s`.
+    """The stations along a curve: at least one piece, in order of `s`.
 
     Examples
     --------

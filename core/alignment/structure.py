@@ -40,15 +40,7 @@ SAME_M = 12.0
 
 @dataclass(frozen=True)
 class Blocks:
-    """A signal as means over fine and coarse blocks.
-
-    Attributes
-    ----------
-    first : float
-        Distance at which the first block begins, metres.
-    noise : Noise
-        Of the points.
-    """
+    """A signal as means over fine and coarse blocks, the first of which begins at `first`, metres; noise of points."""
 
     fine: Samples
     coarse: Samples
@@ -97,18 +89,11 @@ def _averaged(s: np.ndarray, y: np.ndarray, weight: np.ndarray, number: np.ndarr
 
 @dataclass(frozen=True)
 class Rules:
-    """What a chain may be made of.
+    """What a chain may be made of: whether the bend may change linearly, and whether it may jump.
 
-    Attributes
-    ----------
-    ramps, jumps : bool
-        Whether the bend may change linearly, and whether it may jump.
-    least_m : float
-        Least length of a part or a ramp, metres.
-    price : float
-        Cost of a parameter, in units of chi-square.
-    shown_m : float
-        Distance of a signal from its curve that no survey shows, metres: up to there, fewer parameters are better.
+    `least_m` is the least length of a part or a ramp, and `price` the cost of a parameter, in units of chi-square.
+    `shown_m` is the distance of a signal from its curve that no survey shows, metres: up to there, fewer parameters are
+    better.
     """
 
     ramps: bool

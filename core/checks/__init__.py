@@ -9,9 +9,9 @@ from ..parameters import Parameters
 from ..progress import Progress
 from ..rails import RailNetwork
 from ..tiles.grid import SortedPoints
-from .density import warn_of_airborne, warn_of_unexplained
 from .doubts import doubting_jumps, doubting_scatter, gauge_scatter, warn_of_strips
 from .lines import warn_of_rails, warn_of_split_classes, with_tracks
+from .points import warn_of_airborne, warn_of_unexplained
 from .standard import head_widths
 
 

@@ -141,12 +141,9 @@ def _doubting(rail: RailLine, found: Sequence[tuple[np.ndarray, float]]) -> Rail
 def _steps_along(line: np.ndarray, support: Support | None = None) -> tuple[np.ndarray, ...]:
     """Fit a cubic and a step to a line, (n, 2), on either side of stations along it.
 
-    Returns
-    -------
-    places : (k, 2) array
-    across, bend, chance : (k,) arrays
-        Step to the left, metres, in either direction along the line; the step that the difference between the
-        curvatures on both sides looks like; standard error of the line, less what passes of a scanner add to it.
+    Returns places, (k, 2), and (k,) each: the step to the left, metres, in either direction along the line; the step
+    that the difference between the curvatures on both sides looks like; and the standard error of the line, less what
+    passes of a scanner add to it.
     """
     own = Polyline(line)
     t = np.arange(0.0, own.length_m, STATION_STEP_M)

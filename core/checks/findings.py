@@ -45,15 +45,7 @@ FEW, MANY = 0.05, 0.25
 
 @dataclass(frozen=True)
 class Doubt:
-    """A reason to look at a place.
-
-    Attributes
-    ----------
-    name : str
-        CSS class of its marks in the pictures.
-    label : str
-        The reason in words, for lists.
-    """
+    """A reason to look at a place: CSS class of its marks in the pictures, and the reason in words, for lists."""
 
     name: str
     label: str
@@ -67,16 +59,8 @@ DOUBTS = (UNSUPPORTED, OFF_GAUGE, UNSURE)
 
 
 @dataclass(frozen=True)
-class Place:
-    """A section of a track to look at.
-
-    Attributes
-    ----------
-    start_m, end_m : float
-        Chainages.
-    length_m : float
-        Length in doubt within the section.
-    """
+class DoubtfulPlace:
+    """A section of a track to look at between two chainages; `length_m` is the length in doubt within it."""
 
     track_id: int
     doubt: Doubt
@@ -87,16 +71,10 @@ class Place:
 
 @dataclass(frozen=True)
 class TrackFindings:
-    """The findings on one track.
+    """The findings on one track, and the nearest of the gauges that tracks may have, `nominal_mm`.
 
-    Attributes
-    ----------
-    nominal_mm : float
-        Nearest of the gauges that tracks may have.
-    doubtful : dict of Doubt to (n,) bool array
-        Stations in doubt, by reason; a station has at most one.
-    steps : tuple of tuple of float
-        Chainage and size in metres of its steps to the side.
+    `doubtful` has the stations in doubt, (n,), by reason; a station has at most one. `steps` are chainage and size in
+    metres of its steps to the side.
     """
 
     line: Centerline
@@ -120,22 +98,14 @@ class TrackFindings:
         """Return the length in doubt for a reason."""
         return float(self.geometry.cells_m[self.doubtful[doubt]].sum())
 
-    def places(self, doubt: Doubt, merge_m: float = MERGE_M) -> list[Place]:
+    def places(self, doubt: Doubt, merge_m: float = MERGE_M) -> list[DoubtfulPlace]:
         """Return the places in doubt for a reason; those no more than `merge_m` apart are merged."""
         return list(_places(self.geometry, doubt, self.doubtful[doubt], merge_m))
 
 
 @dataclass(frozen=True)
 class Hole:
-    """A section without rails between two tracks that are likely one.
-
-    Attributes
-    ----------
-    first, second : int
-        Numbers of the tracks.
-    ends : (2, 3) array
-        Ends of the tracks, local metres.
-    """
+    """A section without rails between two tracks that are likely one; `ends`, (2, 3), are theirs in local metres."""
 
     first: int
     second: int
@@ -147,16 +117,9 @@ class Hole:
 class Findings:
     """The findings on all tracks, and on what the stations of tracks do not show.
 
-    Attributes
-    ----------
-    lonely : tuple of RailLine
-        Rails that belong to no track.
-    rails_m : float
-        Length of all rails.
-    heads : HeadWidths or None
-        Width of the heads; only if another one is stated.
-    stepped_m : float
-        Plan length of the tracks that step to the side: on one side of a step, all of it is off.
+    `lonely` rails belong to no track, and `rails_m` is the length of all rails. `heads` has the width of the heads only
+    if another one is stated. `stepped_m` is the plan length of the tracks that step to the side: on one side of a step,
+    all of it is off.
     """
 
     tracks: tuple[TrackFindings, ...]
@@ -196,22 +159,14 @@ class Findings:
         """Share of the length that is in doubt for any reason."""
         return sum(self.length_of(doubt) for doubt in DOUBTS) / self.length_m if self.tracks else 1.0
 
-    def places(self) -> list[Place]:
+    def places(self) -> list[DoubtfulPlace]:
         """Return all places to look at, in order of decreasing length in doubt."""
         found = [place for track in self.tracks for doubt in DOUBTS for place in track.places(doubt)]
         return sorted(found, key=lambda place: -place.length_m)
 
 
 def examine(network: RailNetwork, gauges_m: Sequence[float]) -> Findings:
-    """Find where the tracks of a network are in doubt.
-
-    Parameters
-    ----------
-    network : RailNetwork
-        With the geometry of its tracks, in any order.
-    gauges_m : sequence of float
-        Gauges that tracks may have.
-    """
+    """Find where the tracks of a network with their geometry, which may have `gauges_m`, are in doubt."""
     geometry = {track.track_id: track for track in network.geometry}
     tracks = tuple(
         _examine_track(line, geometry[line.track_id], gauges_m, find_jumps(line, network.rails))
@@ -305,7 +260,7 @@ def gauge_off(geometry: TrackGeometry, nominal_mm: float) -> np.ndarray:
     return np.where(off_mm <= GAUGE_SIGMAS * geometry.sigma_mm, 0.0, off_mm)
 
 
-def _places(geometry: TrackGeometry, doubt: Doubt, doubtful: np.ndarray, merge_m: float) -> Iterator[Place]:
+def _places(geometry: TrackGeometry, doubt: Doubt, doubtful: np.ndarray, merge_m: float) -> Iterator[DoubtfulPlace]:
     """Join stations in doubt into places."""
     numbers = np.flatnonzero(doubtful)
     if not len(numbers):
@@ -315,7 +270,7 @@ def _places(geometry: TrackGeometry, doubt: Doubt, doubtful: np.ndarray, merge_m
     apart = np.flatnonzero(starts[1:] - ends[:-1] > merge_m) + 1
     for mine in np.split(np.arange(len(numbers)), apart):
         length_m = geometry.cells_m[numbers[mine]].sum()
-        yield Place(geometry.track_id, doubt, float(starts[mine[0]]), float(ends[mine[-1]]), float(length_m))
+        yield DoubtfulPlace(geometry.track_id, doubt, float(starts[mine[0]]), float(ends[mine[-1]]), float(length_m))
 
 
 def known(values: np.ndarray) -> np.ndarray:

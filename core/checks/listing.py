@@ -24,9 +24,9 @@ from .findings import (
     UNSUPPORTED,
     UNSURE,
     UNSURE_MM,
+    DoubtfulPlace,
     Findings,
     Hole,
-    Place,
     TrackFindings,
     examine,
     known,
@@ -132,7 +132,7 @@ def _possible_error(track: TrackFindings) -> np.ndarray:
     return np.minimum(np.nan_to_num(error_mm, nan=OFF_RAIL_MM), OFF_RAIL_MM)
 
 
-def _of_place(track: TrackFindings, place: Place, error_mm: np.ndarray) -> Finding:
+def _of_place(track: TrackFindings, place: DoubtfulPlace, error_mm: np.ndarray) -> Finding:
     geometry = track.geometry
     within = (geometry.chainage_m >= place.start_m) & (geometry.chainage_m <= place.end_m)
     numbers = np.flatnonzero(within & track.doubtful[place.doubt])
@@ -209,15 +209,7 @@ def _of_lone_rail(rail: RailLine) -> Finding:
 
 
 def summary(network: RailNetwork, gauges_m: Sequence[float]) -> tuple[str, str]:
-    """Return the verdict in words, and the figures that it is based on.
-
-    Parameters
-    ----------
-    network : RailNetwork
-        The verdict needs the geometry of its tracks.
-    gauges_m : sequence of float
-        Gauges that tracks may have.
-    """
+    """Return the verdict on tracks, which may have `gauges_m`, in words, and the figures that it is based on."""
     rails, tracks = (
         f"{counted(len(lines), what)} ({metres(sum(line.length_m for line in lines))})"
         for what, lines in (("rail", network.rails), ("track", network.centerlines))

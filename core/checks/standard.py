@@ -25,8 +25,7 @@ from ..rails import HEAD_OFF_M, HeadWidths, RailLine, SearchFigures
 from ..standards import HEAD_WIDTH_RANGE_MM, SAME_GAUGE_M, STANDARDS, Gauge, RailStandard, closest_standard, of_gauge
 from ..tiles.grid import PointSource
 from ..tracks.parallels import width_at
-from .density import fullest_square
-from .gauge_estimate import Spacings, measure_spacings
+from .points import Spacings, fullest_square, measure_spacings
 
 SAMPLE_M = 50.0
 """Half the side of the area whose points show the width of the heads."""
@@ -61,14 +60,8 @@ FEET = (0.3048, 1 / 0.3048)
 def detect_standard(request: Request, progress: Progress = SILENT) -> RailStandard:
     """Find the rail standard that fits the first points of a cloud, and say what was measured and what fits as well.
 
-    Raises
-    ------
-    CloudError
-        A file is damaged.
-    NoRailPointsError
-        There is no point of the rail classes.
-    ParameterError
-        The points are too sparse, or no standard fits.
+    Raises CloudError if a file is damaged, NoRailPointsError if there is no point of the rail classes, and
+    ParameterError if the points are too sparse, or no standard fits.
     """
     xyz, census = request.sample()
     if not len(xyz):
@@ -87,19 +80,8 @@ def detect_in_raw(request: Request, progress: Progress = SILENT) -> RailStandard
 def warn_of_raw(request: Request, found: SearchFigures, parameters: Parameters, progress: Progress = SILENT) -> bool:
     """Look for other gauges where the search of a raw cloud found next to nothing, and warn the user if one has rails.
 
-    Parameters
-    ----------
-    request : Request
-        For `standards.SEARCHED_CLASSES`.
-    found : SearchFigures
-        Of the search at the gauges of the parameters.
-    parameters : Parameters
-    progress : Progress
-
-    Returns
-    -------
-    bool
-        Whether the user has been warned.
+    The request is one for `standards.SEARCHED_CLASSES`, and the figures are those of the search at the gauges of the
+    parameters. Returns whether the user has been warned.
     """
     if found.paired_m >= max(found.single_m, LITTLE_M):
         return False
@@ -111,12 +93,8 @@ def warn_of_raw(request: Request, found: SearchFigures, parameters: Parameters, 
 def _found_at_any_gauge(request: Request, progress: Progress) -> tuple[np.ndarray, float]:
     """Find rails for each plausible gauge where a raw cloud is densest.
 
-    Returns
-    -------
-    xyz : (n, 3) array
-        Points on the rails of the gauge of which there are most.
-    paired_m : float
-        Their length.
+    Returns the points, (n, 3), on the rails of the gauge of which there are most, and the length of these rails,
+    metres.
     """
     xyz, census = request.sample(RAW_SAMPLE_POINTS)
     if not len(xyz):

@@ -58,16 +58,9 @@ BORDER = 1e-6
 class Coarse:
     """The grid of coarse cells that holds the points of a square.
 
-    Attributes
-    ----------
-    column, row : int
-        Of its south-western cell; cell (0, 0) has its south-western corner at the square's.
-    shape : tuple of int
-        Rows and columns.
-    cell : (n,) int32 array
-        Cell of each point.
-    count : (rows * columns,) int array
-        Points of each cell.
+    Cell (0, 0) has its south-western corner at the square's; `column` and `row` are those of the grid's south-western
+    cell, and the shape is rows and columns. `cell`, (n,), is that of each point, and `count` the number of points of
+    each cell.
     """
 
     column: int
@@ -104,13 +97,9 @@ class Coarse:
 
 @dataclass(frozen=True)
 class Bed:
-    """Planes of the levels.
+    """Planes of the levels, (MAX_LEVELS, 3, cells) float32: height in the middle of the cell, slopes to east and north.
 
-    Attributes
-    ----------
-    coarse : Coarse
-    planes : (MAX_LEVELS, 3, cells) float32 array
-        Height in the middle of the cell and slopes to the east and north; NaN where there is no such level.
+    NaN where there is no such level.
     """
 
     coarse: Coarse
@@ -120,13 +109,7 @@ class Bed:
     def under(cls, xyz: np.ndarray) -> tuple[Bed, np.ndarray, np.ndarray]:
         """Find the bed under points, (n, 3) metres.
 
-        Returns
-        -------
-        Bed
-        height : (n,) float32 array
-            Of each point above the bed; see `heights`.
-        z : (n,) float32 array
-            Their heights from a multiple of `ORIGIN_STEP` on.
+        Also returns their heights, (n,), above it and from a multiple of `ORIGIN_STEP` on.
         """
         x, y = (np.ascontiguousarray(values) for values in xyz.T[:2])
         z = (xyz[:, 2] - ORIGIN_STEP * np.floor(xyz[:, 2].min() / ORIGIN_STEP)).astype(np.float32)
@@ -136,19 +119,10 @@ class Bed:
         return bed, bed.heights(dx, dy, z)[0], z
 
     def heights(self, dx: np.ndarray, dy: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Height of each point above the highest level that is not above it.
+        """Height of each point above the highest level that is not above it, (n,), and the number of this level.
 
-        Parameters
-        ----------
-        dx, dy : (n,) arrays
-            See `Coarse.offsets`.
-        z : (n,) array
-
-        Returns
-        -------
-        height : (n,) float32 array
-            Infinite for points below all levels, and where there is none.
-        level : (n,) int8 array
+        The height is infinite for points below all levels, and where there is none; offsets are those of
+        `Coarse.offsets`.
         """
         cell = self.coarse.cell
         height, level = _above(self.planes[0], cell, dx, dy, z), np.zeros(len(z), dtype=np.int8)
@@ -171,16 +145,10 @@ class Bed:
 
 
 def find_bed(coarse: Coarse, dx: np.ndarray, dy: np.ndarray, z: np.ndarray) -> Bed:
-    """Find the levels of each coarse cell and lay planes through neighbouring ones.
+    """Find the levels of each coarse cell and lay planes through neighbouring ones; arguments as in `Bed.heights`.
 
-    The quantile is taken twice: of the heights, and of the heights above the planes through the first ones. The
-    second is free of the slope within a cell.
-
-    Parameters
-    ----------
-    coarse : Coarse
-    dx, dy, z : (n,) arrays
-        See `Bed.heights`.
+    The quantile is taken twice: of the heights, and of the heights above the planes through the first ones. The second
+    is free of the slope within a cell.
     """
     first = Bed(coarse, _planes(_quantiles(coarse, _begins(coarse, z), z), coarse.shape))
     return Bed(coarse, _planes(first.planes[:, 0] + _residual_quantiles(first, dx, dy, z), coarse.shape))

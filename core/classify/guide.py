@@ -29,16 +29,10 @@ ACROSS_RAD = 0.5
 
 @dataclass(frozen=True)
 class Guide:
-    """Places along the guide.
+    """Places along the guide, `xy` (n, 2) metres, and unit vectors along it there.
 
-    Attributes
-    ----------
-    xy, along : (n, 2) arrays
-        Places, metres, and unit vectors along the guide there.
-    distance_m : float
-        Tracks whose middle, and single rails that, are further away are left out.
-    only : bool
-        Whether only the tracks along whose middle the guide runs are kept.
+    Tracks whose middle, and single rails that, are further away than `distance_m` are left out; with `only`, only the
+    tracks along whose middle the guide runs are kept.
     """
 
     xy: np.ndarray
@@ -97,15 +91,8 @@ class Guide:
     def keeps(self, lines: Lines, pairs: np.ndarray, spacings_m: Sequence[float], height_m: float) -> np.ndarray:
         """Return which cells belong to pieces of rail that are kept, (n,) bool.
 
-        Parameters
-        ----------
-        lines : Lines
-        pairs : (m, 2) int array
-            Cells that continue each other.
-        spacings_m : sequence of float
-            Distances of the two heads of a track.
-        height_m : float
-            Largest difference in height above the bed between the rails of a track.
+        `pairs`, (m, 2), are cells that continue each other, `spacings_m` the distances of the two heads of a track, and
+        `height_m` is the largest difference in height above the bed between its rails.
         """
         if not len(lines.axis):
             return np.zeros(0, dtype=bool)

@@ -63,15 +63,7 @@ CHUNK = 4000
 
 @dataclass(frozen=True)
 class Marks:
-    """Cells that may belong to lines.
-
-    Attributes
-    ----------
-    xy : (n, 2) array
-        Local metres.
-    height : (n,) array
-        Above the bed.
-    """
+    """Cells that may belong to lines: `xy`, (n, 2) local metres, and height above the bed, (n,)."""
 
     xy: np.ndarray
     height: np.ndarray
@@ -93,7 +85,6 @@ class Lines:
         Share of the parts of the line within reach that hold a cell.
     pure : (n,) array
         Share of the cells on the line among those on it and beside it: 0.07 to 0.12 in random surroundings.
-    reach_m : float
     """
 
     axis: np.ndarray
@@ -145,19 +136,9 @@ def joined(one: Lines, other: Lines) -> Lines:
 def find_lines(
     marks: Marks, reach_m: float, along_m: float, beside_line_m: float, wanted: np.ndarray | None = None
 ) -> Lines:
-    """Find the line through each cell.
+    """Find the line through each cell, compared with those within `reach_m`; with `wanted`, others get no cover.
 
-    Parameters
-    ----------
-    marks : Marks
-    reach_m : float
-        Distance within which cells are compared.
-    along_m : float
-        Largest difference in height between neighbours on a line.
-    beside_line_m : float
-        Largest distance across from the line.
-    wanted : (k,) int array, optional
-        Cells whose lines are needed; the others get no cover.
+    Neighbours on a line differ by at most `along_m` in height, and are at most `beside_line_m` across from it.
     """
     count = len(marks.xy)
     wanted = np.arange(count) if wanted is None else wanted
@@ -174,14 +155,7 @@ def _neighbours(
 ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
     """Yield wanted cells, chunk by chunk, with their neighbours of the same height.
 
-    Yields
-    ------
-    chosen : (k,) int array
-        Cells.
-    number : (m,) int array
-        Number of the cell in `chosen`.
-    step : (m, 2) array
-        From the cell to its neighbour.
+    A chunk is the cells, (k,), and, (m,) each, a cell's number in them and the step, (m, 2), from it to its neighbour.
     """
     if len(marks.xy) < 2 or not len(wanted):
         return
@@ -256,17 +230,10 @@ def _measured(
 
 
 def centred(lines: Lines, cells: Marks, half_m: float, along_m: float) -> Lines:
-    """Move the axes to the middle of all cells of their heads: those that were thinned are to one side or the other.
+    """Move axes to the middle of all narrow cells of their heads: those that were thinned are to one side or the other.
 
-    Parameters
-    ----------
-    lines : Lines
-    cells : Marks
-        All narrow cells.
-    half_m : float
-        Largest distance of a cell's top from the axis of its head: half the head and noise, short of a guard rail.
-    along_m : float
-        Largest difference in height.
+    A cell's top is at most `half_m` from the axis of its head, which is half the head and noise, short of a guard rail,
+    and at most `along_m` from it in height.
     """
     if not len(lines.axis):
         return lines

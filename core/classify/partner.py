@@ -46,15 +46,9 @@ MAJORITY = 0.5
 
 
 def have_partners(lines: Lines, spacings_m: Sequence[float], height_m: float) -> np.ndarray:
-    """Return which cells belong to a pair of rails, (n,) bool.
+    """Return which cells belong to a pair of rails, (n,) bool, at the best of the distances of the two heads.
 
-    Parameters
-    ----------
-    lines : Lines
-    spacings_m : sequence of float
-        Distances of the two heads; the best one counts.
-    height_m : float
-        Largest difference in height above the bed.
+    `height_m` is the largest difference in height above the bed.
     """
     stations = [partners(lines, spacing_m, SPACING_M, height_m)[0] for spacing_m in spacings_m]
     return np.max(stations, axis=0) >= MIN_STATIONS
@@ -63,24 +57,11 @@ def have_partners(lines: Lines, spacings_m: Sequence[float], height_m: float) ->
 def partners(
     lines: Lines, spacing_m: float, tolerance_m: float, height_m: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Find the partners of each cell's line on the better side.
+    """Find the partners of each cell's line on the better side: `spacing_m` away, give or take `tolerance_m`.
 
-    Parameters
-    ----------
-    lines : Lines
-    spacing_m, tolerance_m : float
-        Distance of the two lines, and its largest deviation.
-    height_m : float
-        Largest difference in height above the bed.
-
-    Returns
-    -------
-    stations : (n,) int array
-        Stations with a partner, 0 to 5.
-    side : (n,) int array
-        1: the partner is to the left; -1: to the right.
-    apart_m : (n,) array
-        Mean distance of the partner; NaN without one.
+    They differ by at most `height_m` in height above the bed. Returns, (n,) each, the number of stations with a
+    partner, 0 to 5, the side, 1 if the partner is to the left and -1 to the right, and its mean distance, NaN without
+    one.
     """
     count = len(lines.axis)
     if count < 2:
@@ -120,15 +101,7 @@ def runs_inside(
 ) -> np.ndarray:
     """Return which cells belong to something that runs along a rail of a track, at less than the gauge, (n,) bool.
 
-    Parameters
-    ----------
-    lines : Lines
-    paired : (n,) bool array
-        Cells of rails that have their partner.
-    links : (m, 2) int array
-        Pairs of cells on one line.
-    gauges_m : sequence of float
-    head_width_m : float
+    Cells of rails that have their partner are `paired`, (n,); `links`, (m, 2), are pairs of cells on one line.
     """
     inside = np.zeros(len(lines.axis), dtype=bool)
     single, rails = np.flatnonzero(~paired), np.flatnonzero(paired)

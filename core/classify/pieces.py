@@ -92,21 +92,10 @@ def long_enough(
     keep_single: bool,
     least_m: float = LEAST_M,
 ) -> np.ndarray:
-    """Return which cells belong to pieces that are kept, (n,) bool.
+    """Return which cells belong to pieces that are kept, (n,) bool: with a partner, if they are as long as `least_m`.
 
-    Parameters
-    ----------
-    lines : Lines
-    pairs : (m, 2) int array
-        See `links`.
-    paired : (n,) bool array
-    open_ended : (n,) bool array
-        Cells at the border of what the square sees: their pieces continue beyond it and are long enough, because they
-        already run through the whole margin.
-    keep_single : bool
-        Whether pieces without a partner are kept.
-    least_m : float
-        Shortest piece with a partner.
+    Pieces without a partner are kept with `keep_single`. Pieces of cells that are `open_ended`, at the border of what
+    the square sees, continue beyond it and are long enough, because they already run through the whole margin.
     """
     if not len(lines.axis):
         return np.zeros(0, dtype=bool)
@@ -132,11 +121,7 @@ def _reaches(xy: np.ndarray, piece: np.ndarray, least_m: float, open_ended: np.n
 def shares_of_length(lines: Lines, half_m: float) -> np.ndarray:
     """Length of rail that each cell stands for, (n,) metres: half the way to the next cell ahead and behind.
 
-    Parameters
-    ----------
-    lines : Lines
-    half_m : float
-        Distance across within which two cells are on one line.
+    Two cells within `half_m` across are on one line.
     """
     count = len(lines.axis)
     if count < 2:
@@ -156,17 +141,7 @@ def shares_of_length(lines: Lines, half_m: float) -> np.ndarray:
 
 
 def stands_free(tops: Tops, band: Band, marks: np.ndarray, lines: Lines) -> np.ndarray:
-    """Return which lines have lower ground, or nothing seen, on each side, (n,) bool.
-
-    Parameters
-    ----------
-    tops : Tops
-    band : Band
-    marks : (n,) int array
-        Cells.
-    lines : Lines
-        The line of each cell.
-    """
+    """Return which lines of cells, `marks`, have lower ground, or nothing seen, on each side, (n,) bool."""
     along = np.linspace(-0.5, 0.5, ALONG) * lines.reach_m
     free = np.ones(len(lines.axis), dtype=bool)
     depth_m = band.depth_m(lines.height)

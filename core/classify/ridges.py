@@ -57,15 +57,10 @@ LEAST_POINTS = 1.0
 
 @dataclass(frozen=True)
 class Ridges:
-    """The ridges under pieces of line.
+    """The ridges under pieces of line, (pieces,) each; NaN where a side is not seen as far down as half the height.
 
-    Attributes
-    ----------
-    width_m : (pieces,) array
-        Width at half the height; NaN where a side is not seen as far down as that.
-    spread_m : (pieces,) array
-        Standard deviation of the Gaussian ridge whose sides are as steep; NaN likewise.
-    length_m : (pieces,) array
+    `width_m` is the width at half the height, `spread_m` the standard deviation of the Gaussian ridge whose sides are
+    as steep.
     """
 
     width_m: np.ndarray
@@ -74,17 +69,7 @@ class Ridges:
 
     @classmethod
     def measure(cls, xy: np.ndarray, height: np.ndarray, lines: Lines, piece: np.ndarray) -> Ridges:
-        """Measure the ridges under pieces.
-
-        Parameters
-        ----------
-        xy, height : (n, 2) and (n,) arrays
-            Of the points; height above the bed.
-        lines : Lines
-            Lines of the pieces' cells.
-        piece : (cells,) int array
-            Piece of each cell.
-        """
+        """Measure ridges, given points by place and height above the bed, and the piece of each line's cell."""
         sections = _sections(xy, height, lines, piece)
         middle = BINS // 2
         sides = sections[:, middle:], sections[:, middle - 1 :: -1]
@@ -113,18 +98,10 @@ class Ridges:
 
 
 def on_crests(xy: np.ndarray, height: np.ndarray, lines: Lines, blur_m: float) -> Lines:
-    """Move axes onto the crests of their ridges.
+    """Move axes onto the crests of their ridges, of standard deviation `blur_m`, given points by place and height.
 
     The tops of the cells of a ridge are led aside by ballast that is higher on one side. The ridge is a Gaussian on a
     plane bed, and the slope of the bed does not move it.
-
-    Parameters
-    ----------
-    xy, height : (n, 2) and (n,) arrays
-        Of the points; height above the bed.
-    lines : Lines
-    blur_m : float
-        Standard deviation of the ridges.
     """
     if not len(lines.axis):
         return lines
@@ -149,12 +126,8 @@ def cells_beside(grid: Grid, lines: Lines, half_m: float) -> np.ndarray:
 def _explained(count: np.ndarray, rise: np.ndarray, crest_m: float, blur_m: float) -> np.ndarray:
     """Sum of squares that a ridge at `crest_m` and a plane bed explain of cross-sections, (k,).
 
-    Parameters
-    ----------
-    count, rise : (k, BINS) arrays
-        Points by bin, and the sum of their heights.
-    crest_m, blur_m : float
-        Place across and standard deviation of the ridge.
+    `count` and `rise`, (k, BINS), are the points by bin and the sum of their heights; `blur_m` is the standard
+    deviation of the ridge.
     """
     across = (np.arange(BINS) - BINS / 2 + 0.5) * BIN_M
     model = np.stack([np.ones(BINS), across / REACH_M, np.exp(-0.5 * ((across - crest_m) / blur_m) ** 2)])
@@ -217,11 +190,7 @@ def _around(xy: np.ndarray, places: np.ndarray, reach_m: float) -> np.ndarray:
 def _levels(side: np.ndarray, top: np.ndarray) -> np.ndarray:
     """Distances from the axis at which one side of each ridge falls below the levels, (levels, pieces) metres.
 
-    Parameters
-    ----------
-    side : (pieces, bins) array
-        Heights outwards from the axis.
-    top : (pieces,) array
+    `side`, (pieces, bins), has heights outwards from the axis, and `top`, (pieces,), those of the ridges.
     """
     bins = round(BASE_M / BIN_M)
     unseen = np.isnan(side)

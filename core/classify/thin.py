@@ -45,16 +45,9 @@ SURROUNDINGS_M = 6.0
 
 
 def drawn(xyz: np.ndarray, spacings_m: Sequence[float], cell_m: float) -> np.ndarray:
-    """Places along thin rails, half a cell apart, (k, 2) local metres.
+    """Places along thin rails, half a cell apart, (k, 2) local metres, given rail points, (n, 3).
 
-    Parameters
-    ----------
-    xyz : (n, 3) array
-        Rail points, local metres.
-    spacings_m : sequence of float
-        Distances of the two heads of a track.
-    cell_m : float
-        Side of a cell.
+    `spacings_m` are the distances of the two heads of a track.
     """
     cells = _cells(xyz, cell_m)
     if len(cells.xy) < 2:

@@ -62,16 +62,7 @@ class Band:
 
 @dataclass(frozen=True)
 class Grid:
-    """A window of the raster of rail cells; see `raster.rasterize`.
-
-    Attributes
-    ----------
-    cell_m : float
-    row, column : int
-        Cell of the raster at the window's north-western corner.
-    shape : tuple of int
-        Rows and columns.
-    """
+    """A window of the raster of rail cells, see `raster.rasterize`, by the cell at its north-western corner."""
 
     cell_m: float
     row: int
@@ -107,18 +98,11 @@ class Grid:
 
 @dataclass(frozen=True)
 class Tops:
-    """What stands on each cell.
+    """What stands on each cell, (rows, columns) arrays.
 
-    Attributes
-    ----------
-    grid : Grid
-    top : (rows, columns) int16 array
-        Millimetres above the bed of the highest point up to `TOP_M`; `EMPTY` without any.
-    z : (rows, columns) float32 array
-        Height of that point, metres; -inf without any. Heights above the bed compare along a rail; across they do not
-        where the bed bends.
-    seen, high : (rows, columns) bool array
-        Cells with a point below `HIGH_M`, and between `TOP_M` and `HIGH_M`.
+    `top` is the highest point up to `TOP_M`, int16 millimetres above the bed; `EMPTY` without any. `z` is the height of
+    that point, metres, -inf without any: heights above the bed compare along a rail; across they do not where the bed
+    bends. `seen` and `high` hold for cells with a point below `HIGH_M`, and between `TOP_M` and `HIGH_M`.
     """
 
     grid: Grid
@@ -129,18 +113,7 @@ class Tops:
 
 
 def tops_of(grid: Grid, cell: np.ndarray, height: np.ndarray, z: np.ndarray) -> Tops:
-    """Find the tops of the cells.
-
-    Parameters
-    ----------
-    grid : Grid
-    cell : (n,) int array
-        Cell of each point.
-    height : (n,) array
-        Above the bed; those above `HIGH_M` are left out by the caller.
-    z : (n,) array
-        Height, metres.
-    """
+    """Find the tops of the cells, given cell, height above the bed, up to `HIGH_M`, and height of each point, (n,)."""
     cells = grid.shape[0] * grid.shape[1]
     seen, high = np.zeros(cells, dtype=bool), np.zeros(cells, dtype=bool)
     top, highest = np.full(cells, EMPTY, dtype=np.int16), np.full(cells, -np.inf, dtype=np.float32)
@@ -181,16 +154,7 @@ def narrow_tops(tops: Tops, band: Band) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Window:
-    """Square windows around cells, for sums by integral images.
-
-    Attributes
-    ----------
-    grid : Grid
-    cell : (k,) int array
-        Middle cells.
-    reach : int
-        Cells from the middle to the window's border.
-    """
+    """Square windows around cells, (k,), as many cells to every side as `reach`, for sums by integral images."""
 
     grid: Grid
     cell: np.ndarray
@@ -237,19 +201,8 @@ def middles_of_tops(
 ) -> np.ndarray:
     """Find the mean place of the points on top of some cells: truer than the middle of a cell that is half on a head.
 
-    Parameters
-    ----------
-    tops : Tops
-    band : Band
-    cells : (k,) int array
-        In rising order.
-    xy, cell, height : (n, 2), (n,) and (n,) arrays
-        Of each point; see `tops_of`.
-
-    Returns
-    -------
-    (rows * columns, 2) array
-        NaN for all other cells.
+    Cells rise in number; points are given by place, cell and height as in `tops_of`. Returns (rows * columns, 2), NaN
+    for all other cells.
     """
     low = np.full(tops.top.size, np.inf, dtype=np.float32)
     top_m = tops.top.ravel()[cells] / MILLIMETRES

@@ -16,15 +16,7 @@ from .readers import CloudHeader
 
 @dataclass(frozen=True)
 class CrossSection:
-    """A vertical plane across a line.
-
-    Attributes
-    ----------
-    place : (3,) array
-        Place on the line, metres; the height may be NaN.
-    direction : (2,) array
-        Unit vector along the line.
-    """
+    """A vertical plane across a line: a place on it, (3,) metres, height NaN if unknown, and a unit vector along it."""
 
     place: np.ndarray
     direction: np.ndarray
@@ -60,19 +52,9 @@ def cross_section_at(line: np.ndarray, share: float) -> CrossSection:
 def points_near(
     request: Request, places: Sequence[np.ndarray], reach_m: float, progress: Progress = SILENT
 ) -> list[np.ndarray]:
-    """Read the points around places, each file once; files without a place are skipped.
+    """Read the points around places, metres from the zero of the coordinate system, each file once.
 
-    Parameters
-    ----------
-    places : sequence of (3,) arrays
-        Metres from the zero of the coordinate system, as `request.zero` converts them.
-    reach_m : float
-        Distance in plan.
-
-    Returns
-    -------
-    list of (n, 3) arrays
-        Points around each place, metres like `places`.
+    Returns (n, 3) for each place, up to `reach_m` away in plan; files without a place are skipped.
     """
     found: list[list[np.ndarray]] = [[np.empty((0, 3))] for _ in places]
     plan = np.array([place[:2] for place in places]).reshape(-1, 2)

@@ -55,13 +55,7 @@ SAME_PLACE = 1e-3
 
 
 def import_pyproj():
-    """Import pyproj when it is first needed.
-
-    Raises
-    ------
-    CrsError
-        pyproj is not installed.
-    """
+    """Import pyproj when it is first needed; raise CrsError if it is not installed."""
     try:
         with warnings.catch_warnings():
             # In a virtual environment, pyproj warns that it can't find PROJ's data folder; PROJ itself finds it.
@@ -75,12 +69,7 @@ def import_pyproj():
 
 
 def parse_crs(text: str) -> pyproj.CRS:
-    """Parse a coordinate system given as WKT or as a code such as EPSG:32643.
-
-    Raises
-    ------
-    CrsError
-        The text is neither.
+    """Parse a coordinate system given as WKT or as a code such as EPSG:32643; raise CrsError if it is neither.
 
     Examples
     --------
@@ -129,10 +118,7 @@ def _vertical_crs(code: int, unit: int) -> pyproj.CRS | None:
 def units(crs: pyproj.CRS) -> tuple[float, float]:
     """Return the length in metres of the horizontal and the vertical unit; without a height system they are equal.
 
-    Raises
-    ------
-    CrsError
-        The coordinates are degrees, geocentric or no lengths at all, or a unit is impossible.
+    Raises CrsError if the coordinates are degrees, geocentric or no lengths at all, or a unit is impossible.
 
     Examples
     --------
@@ -149,13 +135,7 @@ def units(crs: pyproj.CRS) -> tuple[float, float]:
 
 
 def _lengths(part: pyproj.CRS) -> list[float]:
-    """Return the length in metres of the unit of each axis.
-
-    Raises
-    ------
-    CrsError
-        An axis measures something else, or its unit is impossible, as in a damaged file.
-    """
+    """Return the length in metres of the unit of each axis; CrsError if one is not that of a length, or impossible."""
     kinds = [axis["unit"] for axis in part.to_json_dict()["coordinate_system"]["axis"]]
     for axis, kind in zip(part.axis_info, kinds):
         if kind != "metre" and (isinstance(kind, str) or kind["type"] not in UNITS_OF_LENGTH):
@@ -258,14 +238,8 @@ def warn_of_scale(
     """Warn about a system in which lengths differ from those on the ground, as in Web Mercator.
 
     This is only a warning because local coordinates may be labelled with a system they are not in; their lengths are
-    true.
-
-    Parameters
-    ----------
-    places : sequence of (x, y)
-        In units of the CRS. One place with an acceptable scale factor is enough: the others may belong to stray points.
-    what, it : str
-        Subject and verb of the sentence, such as "cloud.laz is", and the pronoun that refers to the subject.
+    true. One place with an acceptable scale factor is enough: the others may belong to stray points. `what` and `it`
+    are subject and verb of the sentence, such as "cloud.laz is", and the pronoun that refers to the subject.
     """
     plane = _plane(crs)
     known = [one for one in _scales(plane, places) if np.isfinite(one).all()] if plane.is_projected else []
@@ -300,10 +274,7 @@ def _scales(plane: pyproj.CRS, places: Sequence[tuple[float, float]]) -> Iterato
 def common_crs(systems: Sequence[tuple[str, pyproj.CRS | None]]) -> pyproj.CRS | None:
     """Return the system that all files share, given (file name, CRS or None) of each; None if no file states one.
 
-    Raises
-    ------
-    CrsError
-        Two files differ; the message names both.
+    Raises CrsError, whose message names both, if two files differ.
     """
     (first_name, first), *others = systems
     for name, crs in others:

@@ -87,10 +87,7 @@ class Chunk:
 def read_chunk_table(path: Path, header: laspy.LasHeader) -> tuple[Chunk, ...]:
     """Read the table of chunks, and refuse a file whose chunks do not fit it or do not hold the stated points.
 
-    Raises
-    ------
-    CloudError
-        The file is cut off or damaged, or the package that reads LAZ is missing.
+    Raises CloudError if the file is cut off or damaged, or the package that reads LAZ is missing.
     """
     if lazrs is None:
         raise CloudError(
@@ -128,12 +125,7 @@ def _chunks(table: Sequence[tuple[int, int]], header: laspy.LasHeader) -> Iterat
 
 
 def check_layers(path: Path, header: laspy.LasHeader, chunks: Sequence[Chunk], progress: Progress = SILENT) -> None:
-    """Refuse a file with a chunk that is smaller than its layers, or whose chunks hold another number of points.
-
-    Raises
-    ------
-    CloudError
-    """
+    """Refuse a file with a chunk that is smaller than its layers, or whose chunks hold another number of points."""
     record = _record(path, header)
     if not _is_layered(record):
         return
@@ -200,10 +192,7 @@ def read_chunks(
 ) -> Iterator[laspy.ScaleAwarePointRecord]:
     """Decompress fields of chunks, several chunks at once; yields blocks of no more than `most` points.
 
-    Raises
-    ------
-    CloudError
-        A chunk contains erased bytes.
+    Raises CloudError if a chunk contains erased bytes.
     """
     from laspy.point.record import PackedPointRecord, ScaleAwarePointRecord
 

@@ -19,10 +19,7 @@ MAX_COMPARED = 1 << 24
 class Mask:
     """An area bounded by rings: a place is inside if a ray from it crosses their edges an odd number of times.
 
-    Attributes
-    ----------
-    edges : (m, 4) array
-        x and y of both ends of each edge, in units of the coordinate system.
+    An edge, a row of (m, 4), is x and y of both ends, in units of the coordinate system.
     """
 
     edges: np.ndarray

@@ -25,20 +25,9 @@ they are none if they hold fewer points than this on average: the times of some 
 
 
 def marks_of(source_ids: np.ndarray, file_source_id: int, gps_time: np.ndarray | None) -> np.ndarray:
-    """Mark the points of a chunk by their source ids and slots of time.
+    """Mark points by their source id in the upper 16 bits and their slot of time in the lower ones, (n,) uint32.
 
-    By the LAS specification, source id 0 stands for that of the file.
-
-    Parameters
-    ----------
-    source_ids : (n,) uint16 array
-    gps_time : (n,) array or None
-        Seconds; None if the file states no time.
-
-    Returns
-    -------
-    (n,) uint32 array
-        The source id in the upper 16 bits, the slot in the lower ones; 0 for what the file does not state.
+    0 stands for what the file does not state; by the LAS specification, source id 0 stands for that of the file.
     """
     if source_ids.any() and np.count_nonzero(np.bincount(source_ids)) > MAX_NUMBERS:  # quicker than sorting them
         ids = np.zeros(len(source_ids), dtype=np.uint32)
@@ -57,23 +46,11 @@ def _slots(gps_time: np.ndarray | None, count: int) -> np.ndarray:
 
 
 def number_passes(marks: np.ndarray, places: np.ndarray) -> dict[int, int]:
-    """Find the passes of a cloud and number them.
+    """Find the passes of a cloud and number them, below 2¹⁶, by mark, as of `marks_of`.
 
     A pass of one source id goes on from slot to slot, and ends where time is missing or where it comes back to a place
     that it has left. Where every source id is one pass, its number is the id; else passes are numbered in the order of
-    their times.
-
-    Parameters
-    ----------
-    marks : (m,) uint32 array
-        See `marks_of`.
-    places : (m, 2) int array
-        Squares some tens of metres wide that hold points with these marks.
-
-    Returns
-    -------
-    dict of int to int
-        Number of the pass of each mark, below 2¹⁶.
+    their times. `places`, (m, 2), are squares some tens of metres wide that hold points with these marks.
 
     Examples
     --------

@@ -39,18 +39,11 @@ AIRBORNE_SIDE_M, AIRBORNE_DENSITY = 20.0, (0.5, 60.0)
 
 @dataclass(frozen=True)
 class RailPoints:
-    """The points of one class.
+    """The points of one class, `xyz` (n, 3) local metres.
 
-    Attributes
-    ----------
-    xyz : (n, 3) array
-        Local metres.
-    strips : (n,) array or None
-        Number of the strip, a pass of the scanner, that each point belongs to; None if all points are of one strip.
-    found : bool
-        Whether they were found in a raw cloud, and not by their class: in a blunt one they are whole ridges.
-    blunt : bool or None
-        Whether the cloud blunts heads, as its lines have shown; None before there are any.
+    `strips`, (n,), has the number of the strip, a pass of the scanner, that each point belongs to; None if all points
+    are of one strip. If `found`, they are from a raw cloud, and not by their class: in a blunt one they are whole
+    ridges. `blunt` says whether the cloud blunts heads, as its lines have shown; None before there are any.
     """
 
     xyz: np.ndarray
@@ -140,20 +133,10 @@ def read_requested(request: Request, progress: Progress = SILENT) -> tuple[RailP
 
 @dataclass(frozen=True)
 class Request:
-    """Which points to read from which files.
+    """Which points to read from which files; extent and mask are in units of the CRS.
 
-    Attributes
-    ----------
-    extent : tuple of float or None
-        In units of the CRS.
-    zero : LocalFrame
-        Frame whose origin is the zero of the files' coordinate system.
-    mask : Mask or None
-        Area to which the points are limited, in units of the CRS.
-    leave_out : tuple of str
-        Flags whose points are left out; see `readers.read_classes`.
-    merged : bool
-        Whether all points requested count as points of the first class.
+    The origin of `zero` is the zero of the files' coordinate system. `leave_out` has flags whose points are left out,
+    as in `readers.read_classes`; if `merged`, all points requested count as points of the first class.
     """
 
     headers: tuple[CloudHeader, ...]
@@ -205,19 +188,10 @@ class Request:
         return max(xmin), max(ymin), min(xmax), min(ymax)
 
     def sample(self, count: int = SAMPLE_POINTS) -> tuple[np.ndarray, np.ndarray]:
-        """Read the first points requested; takes a few seconds for a cloud of any size.
+        """Read the first points requested; takes a few seconds for any cloud, since `count` of them are enough.
 
-        Returns
-        -------
-        xyz : (n, 3) array
-            Metres from one of them; `count` of them are enough.
-        census : (256,) int array
-            Number of points of each class that were passed.
-
-        Raises
-        ------
-        CloudError
-            A file is damaged.
+        Returns them in metres from one of them, (n, 3), and the number of points of each class that were passed,
+        (256,).
         """
         found, passed = [np.empty((0, 3))], np.zeros(LAST_CLASS + 1, dtype=np.int64)
         chunks = (chunk for header in self.headers for chunk in self.read(header))
@@ -279,12 +253,8 @@ def read_each(
 ) -> list[Result]:
     """Run a task on each file of a request, given the arguments for each, and return the results in order.
 
-    The function also gets the request without its files, and the header of the file; see `Task`.
-
-    Raises
-    ------
-    CloudError
-        Not one file could be read.
+    The function also gets the request without its files, and the header of the file; see `Task`. Raises CloudError if
+    not one file could be read.
     """
     alone = replace(request, headers=())
     tasks = {
@@ -309,13 +279,8 @@ def ask(
 ) -> Request:
     """Check a request for points and read the headers of its files; errors as for `read_rail_points`.
 
-    Parameters
-    ----------
-    paths, class_codes, crs_wkt, extent, progress
-        See `read_rail_points`.
-    unreadable : list of str, optional
-        If given, files that can't be read are left out, unless all are, and the reasons are appended here. Files
-        without points are left out in any case.
+    If `unreadable` is given, files that can't be read are left out, unless all are, and the reasons are appended to it.
+    Files without points are left out in any case.
     """
     _check_request(class_codes, extent)
     headers = _read_headers(paths, unreadable, progress)

@@ -13,8 +13,7 @@ import numpy as np
 
 from ..errors import Cancelled, CloudError, EmptyCloudError, RailExtractError
 from ..progress import SILENT, Progress
-from .header import CloudHeader, Extent
-from .vpc import list_tiles
+from .header import CloudHeader, Extent, list_tiles
 
 SUFFIXES = (".las", ".laz")
 """Suffixes of files that are read. COPC files end in .copc.laz."""
@@ -51,10 +50,7 @@ Paths = Union[str, Path, Sequence[Union[str, Path]]]
 def read_header(path: Path) -> CloudHeader:
     """Read and check the header of one file, without its points.
 
-    Raises
-    ------
-    CloudError
-        The file has an unknown suffix, is damaged, is cut off or has no points.
+    Raises CloudError if the file has an unknown suffix, is damaged, is cut off or has no points.
     """
     with _reader(path) as las:
         return las.read_header(path)
@@ -127,11 +123,6 @@ def read_points(path: Path, progress: Progress = SILENT, leave_out: Sequence[str
     """Read all points of a file chunk by chunk, in the order of the file; see `Points` and `read_classes`.
 
     Points that are withheld or have a flag to leave out are yielded, too, and marked as such.
-
-    Raises
-    ------
-    CloudError
-        See `read_classes`.
     """
     with _reader(path) as las:
         for places, codes, marks, valid, _ in las.read_chunks(path, progress, None, leave_out):
@@ -164,12 +155,9 @@ def paths_of(paths: Paths) -> list[Path]:
 def list_files(paths: Paths) -> tuple[Path, ...]:
     """List the cloud files of one path or several, each file once.
 
-    A folder stands for the cloud files in it, sorted by name, and a virtual point cloud for its tiles.
-
-    Raises
-    ------
-    CloudError
-        A path does not exist or has an unknown suffix, a folder contains no cloud, or a virtual point cloud is damaged.
+    A folder stands for the cloud files in it, sorted by name, and a virtual point cloud for its tiles. Raises
+    CloudError if a path does not exist or has an unknown suffix, a folder contains no cloud, or a virtual point cloud
+    is damaged.
     """
     files: list[Path] = []
     for path in paths_of(paths):

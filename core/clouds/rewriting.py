@@ -43,12 +43,7 @@ WRITE_ERRORS = () if lazrs is None else (lazrs.LazrsError,)
 
 
 def check_class(path: Path, class_code: int) -> None:
-    """Refuse a class that the points of a file cannot have.
-
-    Raises
-    ------
-    ParameterError
-    """
+    """Refuse a class that the points of a file cannot have."""
     with explained(path), laspy.open(path, read_evlrs=False) as reader:
         number = reader.header.point_format.id
     if number <= LAST_OLD_FORMAT and class_code > LAST_OLD_CLASS:
@@ -61,16 +56,9 @@ def check_class(path: Path, class_code: int) -> None:
 def rewrite(path: Path, new: Path, change: Change, progress: Progress = SILENT) -> int:
     """Write a copy of a file that has been read and checked with other classes, and return how many points it has.
 
-    The order of the points, their other dimensions, the scale and the records of the header stay. A COPC file becomes
-    a LAZ or LAS file without the records of its octree, and LAS 1.0, which laspy does not write, becomes 1.2. The copy
-    is compressed if its suffix is .laz.
-
-    Raises
-    ------
-    CloudError
-        The file can't be read.
-    OSError
-        The new file can't be written.
+    The order of the points, their other dimensions, the scale and the records of the header stay. A COPC file becomes a
+    LAZ or LAS file without the records of its octree, and LAS 1.0, which laspy does not write, becomes 1.2. The copy is
+    compressed if its suffix is .laz. Raises CloudError or OSError if a file can't be read or written.
     """
     with explained(path):
         reader = laspy.open(path, read_evlrs=False)

@@ -112,13 +112,7 @@ def _on_dask(args: argparse.Namespace) -> bool:
 
 
 def _certificate_files(args: argparse.Namespace, progress: Progress) -> tuple[Path, ...]:
-    """Return authority, certificate and key for a scheduler; none for local workers, or for a tcp:// address.
-
-    Raises
-    ------
-    ParameterError
-        An option is missing, or has nothing to apply to.
-    """
+    """Return authority, certificate and key for a scheduler; none for local workers, or for a tcp:// address."""
     files = args.tls_ca, args.tls_cert, args.tls_key
     secured = (args.scheduler or "").startswith("tls://")
     if secured and None in files:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from functools import partial
+from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -14,10 +15,9 @@ import numpy as np
 
 from ..clouds.crs import MAX_COORDINATE, is_geographic, parse_crs
 from ..clouds.readers import CATALOGUE, paths_of
-from ..disk import Destination, writing
+from ..disk import Destination, scratch_folder, writing
 from ..errors import CrsError, ParameterError, RailExtractError
-from ..files.rail_rasters import RasterSource, open_with_rasterio
-from ..files.raster_file import write_rasters
+from ..files.rail_rasters import RasterSource, open_with_rasterio, write_rasters
 from ..jobs import declaration as kinds
 from ..jobs.clouds import Bounds, CloudSource
 from ..jobs.declaration import Job, Parameter
@@ -27,11 +27,9 @@ from ..jobs.values import Values
 from ..progress import Progress
 from ..run.loop import Runner
 from ..run.processes import workers
-from ..scratch import scratch_folder
-from .options import vector_module
 
 if TYPE_CHECKING:
-    from ..jobs.features import Source
+    from ..jobs.features import FeatureSource
     from ..jobs.result import Rasters
 
 Spell = Callable[[Parameter], str]
@@ -42,21 +40,10 @@ LAYERS, PAGES, RASTERS = (".gpkg", ".dxf", ".csv"), (".html", ".htm"), (".tif", 
 
 
 class FileValues(Values):
-    """Values of the parameters of one run of a job.
+    """Values of the parameters of one run of a job: values and files by name; None, or none, where one is left empty.
 
-    Parameters
-    ----------
-    given : mapping of str to object
-        Values and files by the name of the parameter or output; None, or none, where one is left empty.
-    command : str
-        What repeats the run.
-    keeps : bool
-        Whether the result stays after the run.
-
-    Raises
-    ------
-    ParameterError, DiskError
-        A value is wrong, or an output could not be written after the run.
+    `command` repeats the run, and `keeps` says whether the result stays after it. Raises ParameterError if a value is
+    wrong, and DiskError if an output could not be written after the run.
     """
 
     def __init__(self, job: Job, given: Mapping[str, Any], command: str, keeps: bool = False) -> None:
@@ -139,7 +126,7 @@ class FileValues(Values):
         """Return the places of SEED, which are in the coordinate system of the cloud."""
         return [np.array([place]) for place in self["SEED"]]
 
-    def source(self, name: str) -> Source:
+    def source(self, name: str) -> FeatureSource:
         """Return a layer of a file."""
         return self.once(name, lambda: vector_module(name).read_features(self[name], name, name == "AXIS"))
 
@@ -147,17 +134,8 @@ class FileValues(Values):
 def run_with_files(job: Job, make: Callable[[], FileValues], progress: Progress, spell: Spell) -> Result:
     """Run a job and write the outputs that were given; one that fails does not stop the others.
 
-    Parameters
-    ----------
-    make : callable
-        Returns the values.
-    spell : callable
-        Returns how messages name a parameter.
-
-    Raises
-    ------
-    RailExtractError
-        A value is wrong, or an output could not be written.
+    `make` returns the values, and `spell` how messages name a parameter. Raises RailExtractError if a value is wrong,
+    or an output could not be written.
     """
     try:
         values = make()
@@ -209,13 +187,7 @@ def _write_page(destination: Destination, make: Callable[[], str]) -> None:
 
 
 def read_value(one: Parameter, given: Any) -> Any:
-    """Return the value of a parameter that was given, its default if nothing was.
-
-    Raises
-    ------
-    ParameterError
-        It is wrong, or missing.
-    """
+    """Return the value of a parameter that was given, its default if nothing was."""
     if given is None or (isinstance(given, str) and not given):
         if one.required:
             raise ParameterError(one.refusal(None))
@@ -244,12 +216,7 @@ def _chosen(one: kinds.Choice, given: Any) -> Any:
 
 
 def _system(one: kinds.System, given: Any) -> str:
-    """Read a coordinate system.
-
-    Raises
-    ------
-    ParameterError
-    """
+    """Read a coordinate system."""
     try:
         crs = parse_crs(str(given))
     except CrsError:
@@ -262,12 +229,7 @@ def _system(one: kinds.System, given: Any) -> str:
 
 
 def _extent(one: kinds.Extent, given: Any) -> Bounds:
-    """Read a rectangle; the order of its numbers is that of command lines and Python, not that of QGIS.
-
-    Raises
-    ------
-    ParameterError
-    """
+    """Read a rectangle; the order of its numbers is that of command lines and Python, not that of QGIS."""
     try:
         xmin, ymin, xmax, ymax = map(float, given.split(",") if isinstance(given, str) else given)
     except (TypeError, ValueError):
@@ -276,12 +238,7 @@ def _extent(one: kinds.Extent, given: Any) -> Bounds:
 
 
 def _places(one: kinds.Place, given: Any) -> list[tuple[float, float]]:
-    """Read one place or several, as texts or as pairs of numbers.
-
-    Raises
-    ------
-    ParameterError
-    """
+    """Read one place or several, as texts or as pairs of numbers."""
     several = isinstance(given, Sequence) and not isinstance(given, str) and not isinstance(given[0], (int, float))
     found = []
     for place in given if several else [given]:
@@ -310,13 +267,7 @@ READERS: dict[type, Callable[[Any, Any], Any]] = {
 
 
 def check_packages(one: kinds.Output) -> None:
-    """Check before a run that an output can be written.
-
-    Raises
-    ------
-    ParameterError
-        A package is not installed.
-    """
+    """Check before a run that an output can be written, with the packages that are installed."""
     if isinstance(one, kinds.LayerOutput):
         vector_module(one.name, ".files.writing")
     elif isinstance(one, kinds.RasterOutput):
@@ -332,10 +283,7 @@ def check_rasterio(name: str) -> None:
 def destinations_of(job: Job, files: Mapping[str, Path]) -> dict[str, Destination]:
     """Check that outputs can be written, make their folders, and return their destinations.
 
-    Raises
-    ------
-    ParameterError, DiskError
-        A required output is missing, one could not be written after the run, or two are the same file.
+    Raises an error if a required output is missing, one could not be written after the run, or two are the same file.
     """
     found: dict[str, Destination] = {}
     shared: dict[Path, Destination] = {}
@@ -360,3 +308,16 @@ def destinations_of(job: Job, files: Mapping[str, Path]) -> dict[str, Destinatio
             raise ParameterError(f"{other} and {one.name} are the same file: give each its own name.")
         found[one.name] = shared.setdefault(destination.file, destination)
     return found
+
+
+def vector_module(option: str, name: str = "vectors") -> Any:
+    """Return the module that reads vector files, or another one of this package that needs the same packages.
+
+    Raises ParameterError if the packages are not installed; `option` is what needs them.
+    """
+    try:
+        return import_module(f".{name}", __package__)
+    except ImportError as error:
+        raise ParameterError(
+            f"{option} needs the packages pyogrio and shapely: in a clone, run pip install .[cluster]."
+        ) from error

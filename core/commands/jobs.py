@@ -1,8 +1,13 @@
-"""A job as a command: its options have the names of its parameters and outputs, in small letters with hyphens."""
+"""A job as a command: its options have the names of its parameters and outputs, in small letters with hyphens.
+
+Steps, remaining time and warnings are printed on the console.
+"""
 
 from __future__ import annotations
 
 import argparse
+import signal
+import sys
 from collections.abc import Callable
 from functools import partial
 from typing import Any
@@ -13,7 +18,6 @@ from ..jobs.declaration import Job, Parameter
 from ..jobs.result import Result
 from ..progress import Estimating, Progress
 from .files import FileValues, run_with_files
-from .options import Console
 
 
 def __getattr__(name: str) -> Callable[[argparse.ArgumentParser], None]:
@@ -91,3 +95,35 @@ def run_and_print(job: Job, make: Callable[[], FileValues], progress: Progress) 
     for sentence in result.sentences:
         print(sentence)
     return result
+
+
+class Console(Progress):
+    """Prints steps, remaining time and warnings to the error output; Ctrl-C cancels it.
+
+    Python drops the exception of a Ctrl-C that comes during a finalizer or some callbacks. The run then ends at its
+    next check for cancellation. `word` returns a message with the names of options for those of parameters.
+    """
+
+    def __init__(self, word: Callable[[str], str] = str) -> None:
+        self._interrupted, self._word = False, word
+        signal.signal(signal.SIGINT, self._interrupt)
+
+    def _interrupt(self, *_: object) -> None:
+        self._interrupted = True
+        raise KeyboardInterrupt
+
+    def is_cancelled(self) -> bool:
+        """Return whether there was a Ctrl-C."""
+        return self._interrupted
+
+    def status(self, text: str) -> None:
+        """Print the current activity."""
+        print(text, file=sys.stderr, flush=True)
+
+    def info(self, text: str) -> None:
+        """Print what was done."""
+        print(self._word(text), file=sys.stderr, flush=True)
+
+    def warning(self, text: str) -> None:
+        """Print a warning."""
+        print(f"Warning: {self._word(text)}", file=sys.stderr, flush=True)

@@ -16,9 +16,9 @@ import shapely
 
 from ..clouds.crs import import_pyproj, parse_crs
 from ..errors import ParameterError
-from ..files.geopackage import geometries_in
+from ..files.writing import geometries_in
 from ..jobs.declaration import LINE, POINT, POLYGON
-from ..jobs.features import Feature, Source
+from ..jobs.features import Feature, FeatureSource
 from ..jobs.lines import Row
 
 LAYER = "|layername="
@@ -28,19 +28,8 @@ KINDS = {"Point": POINT, "LineString": LINE, "Polygon": POLYGON}
 
 
 @dataclass(frozen=True)
-class Features(Source):
-    """A layer of a file, as a whole in memory.
-
-    Attributes
-    ----------
-    name, crs_wkt
-        See `Source`.
-    ids : (n,) int array
-    shapes : (n,) object array
-        Geometries; None where there is none.
-    columns : dict of str to (n,) array
-        Values by the name of the field.
-    """
+class Features(FeatureSource):
+    """A layer of a file, as a whole in memory: geometries, (n,), None where there is none, and (n,) values by field."""
 
     name: str
     crs_wkt: str | None
@@ -119,21 +108,10 @@ def _vertices(part: shapely.Geometry, change: Callable[[np.ndarray], np.ndarray]
 
 
 def read_features(file: str | Path, name: str, measured: bool = False) -> Features:
-    """Read a layer of a file.
+    """Read a layer of a file; `FILE|layername=NAME` names a layer, else its first one is read.
 
-    Parameters
-    ----------
-    file : str or Path
-        A vector file; `FILE|layername=NAME` names a layer, else its first one is read.
-    name : str
-        Of the parameter that names it, for messages.
-    measured : bool
-        Whether M values are needed, which pyogrio drops; those of GeoPackages are read.
-
-    Raises
-    ------
-    ParameterError
-        It can't be read.
+    `name` is the parameter that names the file, for messages. If `measured`, M values are needed, which pyogrio drops;
+    those of GeoPackages are read.
     """
     path, _, layer = str(file).partition(LAYER)
     if Path(path).is_fifo():

@@ -16,8 +16,7 @@ from ..polyline import Chords, Polyline, cross, runs
 from ..progress import SILENT, Progress
 from ..rails import RailLine, cell_borders
 from ..tracks.parallels import most_common_spacing
-from .pieces import cut, spacing_and_cant
-from .shift import Shift, find_shift
+from .measures import Shift, cut, find_shift, spacing_and_cant
 
 BOTH, MISSING, EXTRA = "both", "missing", "extra"
 """States of a station: on a line of both surveys, of the reference only, or of the other survey only."""
@@ -74,15 +73,9 @@ class SurveyedLine:
 
 @dataclass(frozen=True)
 class Survey:
-    """The lines of a survey, and the rails of its tracks where the lines are centerlines.
+    """The lines of a survey, and the rails of its tracks where lines are centerlines and gauge and cant are compared.
 
-    Attributes
-    ----------
-    lines : sequence of SurveyedLine
-    rails : sequence of RailLine
-        Empty if the lines are rails, or if gauge and cant are not compared.
-    sigma_m : float
-        Standard error, across and in height, of lines that state none; NaN if it is unknown.
+    `sigma_m` is the standard error, across and in height, of lines that state none; NaN if it is unknown.
     """
 
     lines: Sequence[SurveyedLine]
@@ -187,14 +180,9 @@ class LineDifferences:
 class TrackComparison:
     """All differences between two surveys.
 
-    Attributes
-    ----------
-    lines : tuple of LineDifferences
-        One for each line of the reference, then one for each line of the other survey with extra lengths.
-    estimated_m : float
-        Standard error across that the scatter of the differences shows, where lines state none; NaN otherwise.
-    counts_shift : bool
-        Whether the constant shift counts as a movement.
+    There is one line for each line of the reference, then one for each line of the other survey with extra lengths.
+    `estimated_m` is the standard error across that the scatter of the differences shows, where lines state none, NaN
+    otherwise; `counts_shift` says whether the constant shift counts as a movement.
     """
 
     lines: tuple[LineDifferences, ...]
@@ -232,15 +220,10 @@ def doubts_of(found: TrackComparison) -> list[str]:
 def compare_surveys(
     reference: Survey, other: Survey, settings: ComparisonParameters, progress: Progress = SILENT
 ) -> TrackComparison:
-    """Compare the lines of a survey with those of a reference at equal distances.
+    """Compare the lines of a survey with those of a reference, in the same frame, at equal distances.
 
     A line of the other survey counts as the same where it is nearest to the reference's line, within reach, and the
     reference's line is in turn the nearest to it: a branch that is missing is not compared with the track beside it.
-
-    Parameters
-    ----------
-    reference, other : Survey
-        In the same frame.
     """
     own, others = (cut([line.xyz for line in survey.lines]) for survey in (reference, other))
     chords = own, others

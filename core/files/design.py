@@ -24,20 +24,11 @@ PROGRAM = "Rail Extract"
 
 @dataclass(frozen=True)
 class Delivery:
-    """What a file states besides the alignments.
+    """What a file states besides the alignments; texts are empty and the EPSG code is None where unknown.
 
-    Attributes
-    ----------
-    gauge_m, head_width_m : float
-        Between the inner faces of the rails, and of a railhead: cant is measured between the middles of the heads.
-    epsg : int or None
-        Code of the coordinate system in plan; None if it has none.
-    system : str
-        Name of the coordinate system; empty if it is unknown.
-    heights : str
-        Name of the system of heights; empty if it is unknown.
-    version : str
-        Of this program.
+    The gauge is measured between the inner faces of the rails; cant, between the middles of heads of `head_width_m`.
+    `system` and `heights` are the names of the coordinate system and of the system of heights, `version` is that of
+    this program.
     """
 
     gauge_m: float
@@ -66,13 +57,7 @@ def names(alignments: Sequence[Alignment]) -> list[str]:
 
 
 def check_joined(alignment: Alignment, progress: Progress = SILENT) -> None:
-    """Check that each element of an alignment begins where the one before it ends.
-
-    Raises
-    ------
-    ParameterError
-        There is a gap in plan, in height or along the curve.
-    """
+    """Check that each element of an alignment begins where the one before it ends, in plan, in height and in `s`."""
     layouts: tuple[Sequence[Element], ...] = alignment.plan, alignment.vertical, alignment.cant
     for elements in layouts:
         for number, (one, after) in enumerate(zip(elements, elements[1:]), start=1):
@@ -104,11 +89,7 @@ def within_plan(alignment: Alignment, where: str, progress: Progress, start_m: f
     """Return an alignment of which profile and cant end with its plan, after a check of all its numbers.
 
     The user is told where profile or cant and the plan do not cover each other, by stations from `start_m` at `s` = 0.
-
-    Raises
-    ------
-    DesignNumberError
-        An element, or the whole, is longer, steeper or farther away than anything on a railway.
+    Raises DesignNumberError if an element, or the whole, is longer, steeper or farther away than anything on a railway.
     """
     checked(alignment.s_to - alignment.s_from, LENGTH, where[0].upper() + where[1:], "length")
     layouts: tuple[Sequence[Element], ...] = (alignment.plan, alignment.vertical, alignment.cant)

@@ -38,12 +38,7 @@ def check_format(path: Path) -> None:
 def check_designs(alignments: Sequence[Alignment], progress: Progress) -> None:
     """Check that alignments can be written; warn of what a format leaves out.
 
-    Raises
-    ------
-    CrsError
-        They are in feet.
-    ParameterError
-        An element does not begin where the one before it ends.
+    Raises CrsError if they are in feet, and ParameterError if an element does not begin where the one before it ends.
     """
     frame = alignments[0].frame
     if (frame.horizontal_unit_m, frame.vertical_unit_m) != (1.0, 1.0):

@@ -65,14 +65,9 @@ Entity = tuple[str, Iterator[tuple[int, Any]]]
 
 @dataclass(frozen=True)
 class Shape:
-    """A line or a point to write.
+    """A line or a point to write, with the values of its fields as they are written.
 
-    Attributes
-    ----------
-    xyz : (n, 3) array
-        Vertices in the coordinates of the cloud; z is NaN without heights. A point has one.
-    values : sequence
-        Values of the fields as they are written.
+    `xyz`, (n, 3), is in the coordinates of the cloud; z is NaN without heights. A point has one vertex.
     """
 
     xyz: np.ndarray

@@ -41,18 +41,10 @@ TURNS = {"ccw": 1.0, "cw": -1.0}
 
 @dataclass(frozen=True)
 class Part:
-    """A plan element as the file states it.
+    """A plan element as the file states it; messages name it by `where`.
 
-    Attributes
-    ----------
-    where : str
-        Names it in messages.
-    start, end : (2,) array
-        Coordinates in the order of the file.
-    k_from, k_to : float
-        Curvatures in 1/m, positive to the left.
-    seen : float
-        1 if the points, taken northing first, turn to the left, -1 to the right, 0 if they do not show it.
+    `start` and `end`, (2,), have the coordinates in the order of the file; curvatures are in 1/m, positive to the left.
+    `seen` is 1 if the points, taken northing first, turn to the left, -1 to the right, 0 if they do not show it.
     """
 
     where: str
@@ -92,10 +84,7 @@ def parts_of(node: ET.Element, name: str, progress: Progress) -> list[Part]:
 def placed(parts: Sequence[Part], frame: LocalFrame, east_first: bool, progress: Progress) -> tuple[PlanElement, ...]:
     """Return plan elements in local metres, from `s` = 0; warn of gaps.
 
-    Raises
-    ------
-    AlignmentFileError
-        An element is missing, or one does not fit its ends.
+    Raises AlignmentFileError if an element is missing, or one does not fit its ends.
     """
     made: list[PlanElement] = []
     s, widest_m = 0.0, 0.0

@@ -45,12 +45,7 @@ def read_landxml(path: Path, east_first: bool = False, progress: Progress = SILE
     """Read the alignments of a LandXML file, of which points may be written easting first, against the format.
 
     They are in local metres of one frame without a coordinate system. Tracks are numbered in the order of the file; `s`
-    starts at 0.
-
-    Raises
-    ------
-    AlignmentFileError
-        The file is damaged, or states something that can't be read.
+    starts at 0. Raises AlignmentFileError if the file is damaged, or states something that can't be read.
     """
     _check_kind(path)
     found = list(branches(path, "LandXML", ("Units", "Alignments"), progress))
@@ -74,10 +69,7 @@ def read_landxml(path: Path, east_first: bool = False, progress: Progress = SILE
 def stated_system(path: Path) -> Optional[str]:
     """Return the code of the coordinate system that a LandXML file states before its alignments, such as EPSG:25832.
 
-    Raises
-    ------
-    AlignmentFileError
-        The file is damaged or of another kind.
+    Raises AlignmentFileError if the file is damaged or of another kind.
     """
     _check_kind(path)
     first = next(branches(path, "LandXML", ("CoordinateSystem", "Alignments")), None)
@@ -163,10 +155,8 @@ MAX_DEPTH = 100
 def branches(path: Path, root: str, names: Collection[str], progress: Progress = SILENT) -> Iterator[ET.Element]:
     """Yield the children of the root with the given names, in the order of the file, whole; others are passed over.
 
-    Raises
-    ------
-    AlignmentFileError
-        The file can't be read, is not XML with this root, is damaged, declares entities, or its branches are too large.
+    Raises AlignmentFileError if the file can't be read, is not XML with this root, is damaged, declares entities, or
+    its branches are too large.
     """
     try:
         with path.open("rb") as file:

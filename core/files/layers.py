@@ -44,14 +44,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Layer:
-    """A layer to write.
+    """A layer to write: columns of values, one per feature, for its fields, and geometries in local metres.
 
-    Attributes
-    ----------
-    columns : sequence of sequence
-        Values of each field, one per feature.
-    xyz : sequence of (n, 3), (n, 4) or (3,) array
-        Vertices of each line, or place of each point, in local metres; a fourth column has M values.
+    `xyz` has the vertices of each line, (n, 3), or with M values (n, 4), or the place of each point, (3,).
     """
 
     product: Product
@@ -87,15 +82,7 @@ class Layer:
 
 @dataclass(frozen=True)
 class Copy:
-    """A layer of the user with further fields.
-
-    Attributes
-    ----------
-    originals : object
-        Its features, as the front end has read them.
-    columns : sequence of sequence
-        Values of each further field, one per feature.
-    """
+    """A layer of the user, as the front end has read it, with further fields: columns of values, one per feature."""
 
     product: ClassVar[Product] = PLACES
     originals: Any

@@ -15,7 +15,7 @@ from ..design_numbers import CANT_MM, GRADE_PM, KM, NUMBER, RADIUS, WHOLE, check
 from ..errors import ParameterError, RailExtractError
 from ..fields import ELEMENT_FIELDS
 from ..frame import ORIGIN_STEP, LocalFrame
-from ..kilometres.text import read_km
+from ..kilometres.stationing import read_km
 from ..progress import SILENT, Progress
 from .design import within_plan
 
@@ -56,10 +56,7 @@ def check_table(names: Collection[str], source: str) -> None:
 def read_table(table: Iterable[Row], source: str) -> list[Row]:
     """Return the rows of an element table with numbers for numbers that are written as text, after a check of all.
 
-    Raises
-    ------
-    DesignNumberError, ParameterError
-        A value is not one that an element can have.
+    Raises DesignNumberError or ParameterError if a value is not one that an element can have.
     """
     known = [one for one in ELEMENT_FIELDS if one.name not in UNREAD]
     return [{one.name: _read(row, one.name, one.kind, f"{_where(row)} of {source}") for one in known} for row in table]
@@ -107,12 +104,7 @@ def alignments(table: Iterable[Row], frame: LocalFrame, progress: Progress = SIL
     """Return the alignments of rows of `read_table`, in any order, in order of their track.
 
     Start, end, place and direction of the start, type and radii are read in plan; height and gradients, or cant, in the
-    other layouts.
-
-    Raises
-    ------
-    ParameterError
-        A row lacks a value or states an impossible one, or a track has no plan.
+    other layouts. Raises ParameterError if a row lacks a value or states an impossible one, or a track has no plan.
     """
     tracks: dict[Optional[int], list[Row]] = {}
     for row in table:

@@ -46,15 +46,9 @@ Stage = Union[Stacked, Combined, Output]
 class Architecture:
     """The numbers that make one FRPDF differ from another.
 
-    Attributes
-    ----------
-    kernel_radius : int
-        The side of a kernel is twice that plus one.
-    dilations : tuple of int
-        Of the stages between encoder and decoder.
-    block : int
-        Side of the square of cells that every layer computes as one; its cells are channels of the input and of the
-        output. With 1, every layer has the resolution of the raster.
+    The side of a kernel is twice `kernel_radius` plus one; `dilations` are those of the stages between encoder and
+    decoder. `block` is the side of the square of cells that every layer computes as one; its cells are channels of the
+    input and of the output. With 1, every layer has the resolution of the raster.
     """
 
     channels: int
@@ -95,13 +89,7 @@ ARCHITECTURES = (BASE, FAST)
 
 @dataclass(frozen=True)
 class Convolution:
-    """A convolution with bias.
-
-    Attributes
-    ----------
-    weight : (out, in, side, side) float32 array
-    bias : (out,) float32 array
-    """
+    """A convolution: float32 weight (out, in, side, side) and bias (out,)."""
 
     weight: np.ndarray
     bias: np.ndarray
@@ -117,12 +105,8 @@ class Convolution:
 class FoldedLayer:
     """A layer: a convolution with ReLU, and in some layers a second, 1 x 1 convolution with ReLU.
 
-    Attributes
-    ----------
-    reduction : Convolution, optional
-        Applied to the channels of the result followed by those of the layer's input.
-    is_output : bool
-        The layer returns logits: it has no ReLU.
+    `reduction` is applied to the channels of the result followed by those of the layer's input. The output layer
+    returns logits: it has no ReLU.
     """
 
     convolution: Convolution
@@ -162,17 +146,9 @@ def architecture_of(arrays: dict[str, np.ndarray]) -> Architecture:
 
 
 def fold(arrays: dict[str, np.ndarray]) -> tuple[tuple[FoldedLayer, ...], ...]:
-    """Fold the arrays of a weights file into the layers of a pass, for each set of batch statistics.
+    """Fold the arrays of a weights file into the layers of the first pass, and those of all later passes.
 
-    Returns
-    -------
-    tuple of tuple of FoldedLayer
-        The layers of the first pass in order, and those of all later passes.
-
-    Raises
-    ------
-    ModelError
-        The arrays are not those of FRPDF.
+    Raises ModelError if the arrays are not those of FRPDF.
     """
     architecture = architecture_of(arrays)
     try:
@@ -221,13 +197,7 @@ def _fold(
 
 
 def _checked(arrays: dict[str, np.ndarray], name: str, shape: tuple[int, ...]) -> np.ndarray:
-    """Return an array of finite numbers with the expected shape.
-
-    Raises
-    ------
-    KeyError, ValueError
-        It is missing, or different.
-    """
+    """Return an array of finite numbers with the expected shape, or raise KeyError or ValueError."""
     array = arrays[name]
     if array.shape != shape:
         raise ValueError(f"{name} has the shape {array.shape} instead of {shape}")

@@ -10,7 +10,7 @@ from ..errors import DeviceExhaustedError
 from ..progress import SILENT, Progress
 from ..raster import TILE, RailRaster
 from . import DEFAULT_PASSES, FEEDBACK_THRESHOLD, MAX_PASSES, OUTPUT_THRESHOLD, START
-from .corridor import Field, Piece, lay_fields
+from .corridor import Batch, Rectangle, lay_batches
 from .engine import Engine
 
 MARGIN = 64
@@ -35,27 +35,19 @@ def is_stable(changed: int, cells: int) -> bool:
 
 
 def clean(raster: RailRaster, engine: Engine, passes: int = DEFAULT_PASSES, progress: Progress = SILENT) -> RailRaster:
-    """Remove noise and close gaps with the network (Gribov and Chang, sections 5 and 7).
+    """Remove noise and close gaps with the network, on the same grid (Gribov and Chang, sections 5 and 7).
 
-    Parameters
-    ----------
-    passes : int
-        Number of passes; with 0, passes run until the result is stable, at most `MAX_PASSES`.
-
-    Returns
-    -------
-    RailRaster
-        The cleaned raster, on the same grid.
+    With 0, passes run until the result is stable, at most `MAX_PASSES`.
     """
     most = max_passes(passes)
     state, output = None, raster
-    fields = lay_fields(raster, engine.max_cells)
+    batches = lay_batches(raster, engine.max_cells)
     for number in range(most):
         step = progress.span(number / most, (number + 1) / most)
         before = output
-        while (found := _run_pass(raster, state, engine, number, fields, step)) is None:
+        while (found := _run_pass(raster, state, engine, number, batches, step)) is None:
             progress.warning(engine.retreat())
-            fields = lay_fields(raster, engine.max_cells)
+            batches = lay_batches(raster, engine.max_cells)
         state, output = found
         if passes == UNTIL_STABLE and number > 0 and is_stable(_changed(before, output), output.count()):
             break
@@ -67,31 +59,31 @@ def _run_pass(
     state: RailRaster | None,
     engine: Engine,
     number: int,
-    fields: Sequence[Field],
+    batches: Sequence[Batch],
     progress: Progress,
 ) -> tuple[RailRaster, RailRaster] | None:
-    """Run a pass, numbered from 0, on fields, given the result of the pass before.
+    """Run a pass, numbered from 0, on batches, given the result of the pass before.
 
     Returns the state of the next pass, and the result if this pass is the last one; None, with the memory released, if
-    the device has not enough of it for a field.
+    the device has not enough of it for a batch.
     """
     cells: dict[float, list[np.ndarray]] = {FEEDBACK_THRESHOLD: [NO_CELLS], OUTPUT_THRESHOLD: [NO_CELLS]}
     try:
-        for field, step in zip(fields, progress.split(len(fields))):
-            seen = [raster.read(*piece.window).astype(np.float32) for piece in field.pieces]
-            known = [_state(state, piece) for piece in field.pieces]
-            found = engine.sweep(seen, known, number, field.pieces, step)
-            for piece, probability in zip(field.pieces, found):
+        for batch, step in zip(batches, progress.split(len(batches))):
+            seen = [raster.read(*piece.window).astype(np.float32) for piece in batch.pieces]
+            known = [_state(state, piece) for piece in batch.pieces]
+            found = engine.sweep(seen, known, number, batch.pieces, step)
+            for piece, probability in zip(batch.pieces, found):
                 for threshold, kept in cells.items():
                     some = np.argwhere(probability >= threshold) + [piece.row, piece.column]
-                    kept.append(some[field.inside.holds(some)])
+                    kept.append(some[batch.inside.holds(some)])
     except DeviceExhaustedError:
         return None
     following, output = (raster.with_cells(np.concatenate(kept)) for kept in cells.values())
     return following, output
 
 
-def _state(state: RailRaster | None, piece: Piece) -> np.ndarray:
+def _state(state: RailRaster | None, piece: Rectangle) -> np.ndarray:
     """Return the state of a piece."""
     if state is None:
         return np.full((piece.height, piece.width), START, dtype=np.float32)

@@ -19,18 +19,12 @@ BESIDE = 1
 MAX_PIECE_CELLS = 1 << 18
 """Largest number of cells in a rectangle: a layer takes 0.1 s on it, so that a cancel takes effect in time."""
 CONTEXT = 256
-"""Width in cells of the frame of context around a field."""
+"""Width in cells of the frame of context around a batch."""
 
 
 @dataclass(frozen=True)
-class Piece:
-    """A rectangle of cells.
-
-    Attributes
-    ----------
-    row, column : int
-        North-west corner.
-    """
+class Rectangle:
+    """A rectangle of cells, by its north-west corner."""
 
     row: int
     column: int
@@ -49,32 +43,28 @@ class Piece:
 
 
 @dataclass(frozen=True)
-class Field:
+class Batch:
     """Pieces that are computed together.
 
-    Attributes
-    ----------
-    inside : Piece
-        Rectangle whose results count; those of a raster do not overlap.
-    pieces : list of Piece
-        Rectangles, without overlap, that cover the corridor inside and, for context, up to `CONTEXT` cells outside.
+    The rectangles `inside`, whose results count, do not overlap in a raster. The pieces, without overlap, cover the
+    corridor inside and, for context, up to `CONTEXT` cells outside.
     """
 
-    inside: Piece
-    pieces: list[Piece]
+    inside: Rectangle
+    pieces: list[Rectangle]
 
 
-def lay_fields(raster: RailRaster, max_cells: int) -> list[Field]:
-    """Cover the corridor with fields of at most `max_cells` cells, not counting their context."""
+def lay_batches(raster: RailRaster, max_cells: int) -> list[Batch]:
+    """Cover the corridor with batches of at most `max_cells` cells, not counting their context."""
     blocks = corridor(raster)
-    fields = []
-    for inside in _fields(blocks, max_cells // BLOCK**2):
+    batches = []
+    for inside in _batches(blocks, max_cells // BLOCK**2):
         frame = CONTEXT // BLOCK
-        wide = Piece(inside.row - frame, inside.column - frame, inside.height + 2 * frame, inside.width + 2 * frame)
+        wide = Rectangle(inside.row - frame, inside.column - frame, inside.height + 2 * frame, inside.width + 2 * frame)
         near = blocks[wide.holds(blocks)]
         pieces = [_in_cells(piece) for piece in _partition(near, MAX_PIECE_CELLS // BLOCK**2)]
-        fields.append(Field(_in_cells(inside), pieces))
-    return fields
+        batches.append(Batch(_in_cells(inside), pieces))
+    return batches
 
 
 def corridor(raster: RailRaster) -> np.ndarray:
@@ -108,16 +98,16 @@ def _numbers(blocks: np.ndarray) -> np.ndarray:
     return blocks[:, 0] * ROW + blocks[:, 1]
 
 
-def _in_cells(blocks: Piece) -> Piece:
-    return Piece(*(BLOCK * number for number in blocks.window))
+def _in_cells(blocks: Rectangle) -> Rectangle:
+    return Rectangle(*(BLOCK * number for number in blocks.window))
 
 
-def _fields(blocks: np.ndarray, most: int) -> list[Piece]:
+def _batches(blocks: np.ndarray, most: int) -> list[Rectangle]:
     """Halve the bounding rectangle of blocks until no part has more than `most` of them."""
     return _divided(blocks, lambda group: _halves(group) if len(group) > most else [])
 
 
-def _partition(blocks: np.ndarray, most: int) -> list[Piece]:
+def _partition(blocks: np.ndarray, most: int) -> list[Rectangle]:
     """Divide blocks along rows and columns while that reduces the cost, or their bounding rectangle is too large."""
 
     def divide(group: np.ndarray) -> list[np.ndarray]:
@@ -130,7 +120,7 @@ def _partition(blocks: np.ndarray, most: int) -> list[Piece]:
     return _divided(blocks, divide)
 
 
-def _divided(blocks: np.ndarray, divide: Callable[[np.ndarray], list[np.ndarray]]) -> list[Piece]:
+def _divided(blocks: np.ndarray, divide: Callable[[np.ndarray], list[np.ndarray]]) -> list[Rectangle]:
     """Return the bounding rectangles of blocks, (n, 2), divided until nothing more is divided."""
     rectangles, waiting = [], [blocks] if len(blocks) else []
     while waiting:
@@ -142,9 +132,9 @@ def _divided(blocks: np.ndarray, divide: Callable[[np.ndarray], list[np.ndarray]
     return rectangles
 
 
-def _bounds(blocks: np.ndarray) -> Piece:
+def _bounds(blocks: np.ndarray) -> Rectangle:
     corner = blocks.min(axis=0)
-    return Piece(*corner.tolist(), *(blocks.max(axis=0) + 1 - corner).tolist())
+    return Rectangle(*corner.tolist(), *(blocks.max(axis=0) + 1 - corner).tolist())
 
 
 def _halves(blocks: np.ndarray) -> list[np.ndarray]:

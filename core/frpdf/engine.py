@@ -13,33 +13,32 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
+from importlib.util import find_spec
 from threading import local
 from typing import Any, Callable
 
 import numpy as np
 
-from ..errors import DeviceExhaustedError
+from ..errors import DeviceExhaustedError, ModelError
 from ..kernels import Library, one_thread, threads
 from ..progress import Progress
-from . import START, STATISTICS
+from . import AUTO, START, STATISTICS
 from .architecture import from_blocks, into_blocks
-from .corridor import MAX_PIECE_CELLS, Piece
+from .corridor import MAX_PIECE_CELLS, Rectangle
 
 Array = Any
 """(channels, height, width) array of the library that computes."""
 
+_PACKAGES = {"TORCH": ("torch", "torch"), "OPENCV": ("cv2", "opencv-python-headless")}
+"""Module and package of each engine."""
+
 
 @dataclass(frozen=True)
 class Step:
-    """A layer, ready to run.
+    """A layer, ready to run, which takes information from `reach` cells, or blocks of cells, away.
 
-    Attributes
-    ----------
-    reach : int
-        Distance in cells, or in blocks of cells, from which the layer takes information.
-    run : callable
-        Takes the input with its surroundings, `reach` cells larger on each side, and the input alone; returns an array
-        of the input's height and width.
+    `run` takes the input with its surroundings, `reach` cells larger on each side, and the input alone; it returns an
+    array of the input's height and width.
     """
 
     reach: int
@@ -49,16 +48,9 @@ class Step:
 class Engine(ABC):
     """Runs the folded network; subclasses add the library that computes.
 
-    Attributes
-    ----------
-    max_cells : int
-        Cells to be computed at once, at least those of a piece.
-    block : int
-        Side of the blocks of cells on which the layers work, which divides the sides and corners of all pieces.
-    library : Library
-        The library that computes, on one thread.
-    description : str
-        Library, device and number type, as shown in ENGINE_USED.
+    `max_cells` are computed at once, at least those of a piece. `block` is the side of the blocks of cells on which the
+    layers work, which divides the sides and corners of all pieces. `library` computes on one thread; `description` has
+    library, device and number type, as shown in ENGINE_USED.
     """
 
     max_cells = 1 << 22
@@ -74,29 +66,14 @@ class Engine(ABC):
         seen: Sequence[np.ndarray],
         known: Sequence[np.ndarray],
         number: int,
-        pieces: Sequence[Piece],
+        pieces: Sequence[Rectangle],
         progress: Progress,
     ) -> list[np.ndarray]:
-        """Run one pass over pieces of a raster that is empty elsewhere.
+        """Run the pass of a number, from 0, over pieces, which do not overlap, of a raster that is empty elsewhere.
 
-        Parameters
-        ----------
-        seen, known : sequences of (height, width) float32 arrays
-            Raster, 0 or 1, and state, as in `network.Recurrent.logits`, of each piece.
-        number : int
-            Number of the pass, from 0.
-        pieces : sequence of Piece
-            Positions of the pieces, which do not overlap.
-
-        Returns
-        -------
-        list of (height, width) float32 arrays
-            Probability of rail, for each piece.
-
-        Raises
-        ------
-        DeviceExhaustedError
-            The same call can be repeated after `retreat`.
+        `seen` (0 or 1) and `known` (as in `network.Recurrent.logits`) are raster and state of each piece, (height,
+        width) float32. Returns the probability of rail of each piece likewise. After DeviceExhaustedError, the same
+        call can be repeated after `retreat`.
         """
         try:
             with one_thread(self.library):
@@ -125,16 +102,9 @@ class Engine(ABC):
     def _run(
         self, step: Step, held: Sequence[Array], outside: Array, near: Sequence[Sequence[Overlap]] | None, number: int
     ) -> Array:
-        """Run a layer on the piece of a number.
+        """Run a layer on the piece of a number, given its input for each piece and `outside`, that on an empty raster.
 
-        Parameters
-        ----------
-        held : sequence of arrays
-            Input of the layer, for each piece.
-        outside : array
-            Its input on an empty raster.
-        near : sequence of sequence of Overlap, optional
-            What surrounds each piece; None for a layer without reach.
+        `near` is what surrounds each piece; None for a layer without reach.
         """
         own, reach = held[number], step.reach
         if near is None:
@@ -145,14 +115,9 @@ class Engine(ABC):
         return step.run(around, own)
 
     def retreat(self) -> str:
-        """Demand less memory, or change to the CPU, and return a message for the user.
+        """Demand less memory, or change to the CPU, and return a message for the user; MemoryError if nothing is left.
 
         Call it after `sweep` raised `DeviceExhaustedError`.
-
-        Raises
-        ------
-        MemoryError
-            There is no smaller demand left.
         """
         self._scratch = local()
         if self.max_cells // 4 < MAX_PIECE_CELLS:
@@ -224,10 +189,7 @@ Overlap = tuple[int, tuple[slice, slice], tuple[slice, slice]]
 def overlaps(windows: np.ndarray, reach: int) -> list[list[Overlap]]:
     """Find, for each piece, the cells of all pieces that are at most `reach` cells away from it, its own among them.
 
-    Parameters
-    ----------
-    windows : (n, 4) int array
-        Row, column, height and width of each piece.
+    `windows`, (n, 4), are row, column, height and width of each piece.
     """
     corners, ends = windows[:, :2], windows[:, :2] + windows[:, 2:]
     first = np.maximum(corners, corners[:, None] - reach)
@@ -244,3 +206,39 @@ def overlaps(windows: np.ndarray, reach: int) -> list[list[Overlap]]:
 
 def _slices(first: Sequence[int], last: Sequence[int]) -> tuple[slice, slice]:
     return slice(first[0], last[0]), slice(first[1], last[1])
+
+
+def make_engine(arrays: dict[str, np.ndarray], engine: str = AUTO, device: str = AUTO) -> Engine:
+    """Set up the engine that the user chose; with AUTO, PyTorch where it is installed and OpenCV elsewhere.
+
+    `engine` is AUTO, TORCH or OPENCV, `device` AUTO, CPU or CUDA. Raises ModelError if the engine's package or device
+    is not available, or the weights are not those of FRPDF.
+    """
+    if choose_engine(engine, device) == "TORCH":
+        try:
+            from .torch_engine import TorchEngine
+        except (ImportError, OSError) as error:  # Windows: a missing library, or one of another plugin with its name
+            if engine != AUTO or device == "CUDA" or not find_spec("cv2"):
+                raise ModelError(
+                    f"PyTorch is installed but does not start ({error}): set ENGINE to OPENCV, or reinstall PyTorch."
+                ) from error
+        else:
+            return TorchEngine(arrays, device)
+    from .opencv_engine import OpenCvEngine
+
+    return OpenCvEngine(arrays)
+
+
+def choose_engine(engine: str, device: str) -> str:
+    """Return the name of the engine to use, without importing it.
+
+    Raises ModelError if its package is not installed, or it cannot use the device.
+    """
+    if engine == AUTO:
+        engine = "TORCH" if find_spec("torch") else "OPENCV"
+    module, package = _PACKAGES[engine]
+    if not find_spec(module):
+        raise ModelError(f"ENGINE {engine} needs the package {package}: install it, or set ENGINE to AUTO.")
+    if engine == "OPENCV" and device == "CUDA":
+        raise ModelError("ENGINE OPENCV runs on the CPU only: set DEVICE to AUTO, or ENGINE to TORCH.")
+    return engine

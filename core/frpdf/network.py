@@ -40,11 +40,7 @@ class PassBatchNorm2d(nn.BatchNorm2d):
     def normalize(self, x: Tensor, mean: Tensor, variance: Tensor) -> Tensor:
         """Normalize with the running statistics; in training with those of the batch, which update the running ones.
 
-        Parameters
-        ----------
-        x : (batch, channels, height, width) tensor
-        mean, variance : (channels,) tensor
-            Running statistics.
+        `x` is (batch, channels, height, width), the statistics are (channels,).
         """
         return nn.functional.batch_norm(
             x, mean, variance, self.weight, self.bias, self.training, self.momentum, self.eps
@@ -118,10 +114,7 @@ def _module(stage: Stage, architecture: Architecture) -> nn.Module:
 class Recurrent(nn.Module):
     """A network that passes over the raster several times; each pass sees the result of the pass before.
 
-    Parameters
-    ----------
-    layer : nn.Module
-        Maps two channels, raster and state, each in -1 to 1, to one channel of logits of the same height and width.
+    `layer` maps two channels, raster and state, each in -1 to 1, to one channel of logits of the same height and width.
     """
 
     def __init__(self, layer: nn.Module) -> None:
@@ -129,16 +122,10 @@ class Recurrent(nn.Module):
         self.layer = layer
 
     def logits(self, raster: Tensor, state: Tensor, number: int) -> Tensor:
-        """Run one pass.
+        """Run the pass of a number, from 0, which selects the batch statistics.
 
-        Parameters
-        ----------
-        raster : (batch, 1, height, width) tensor
-            0 or 1; 0.5 where nothing is known.
-        state : tensor of the same shape
-            `START` in the first pass; in later passes `feedback` of the logits of the pass before.
-        number : int
-            Number of the pass, from 0; it selects the batch statistics.
+        `raster` is (batch, 1, height, width), 0 or 1, and 0.5 where nothing is known; `state`, of the same shape, is
+        `START` in the first pass, in later ones `feedback` of the logits of the pass before.
         """
         for module in self.modules():
             if isinstance(module, PassBatchNorm2d):

@@ -25,20 +25,9 @@ class TorchEngine(Engine):
     library = pytorch()
 
     def __init__(self, arrays: dict[str, np.ndarray], device: str = "AUTO", exact: bool = False) -> None:
-        """Move the weights to the device.
+        """Move the weights to the device, AUTO, CPU or CUDA; an `exact` engine computes in float32 on every device.
 
-        Parameters
-        ----------
-        arrays : dict
-            Weights, from `weights.load_arrays`.
-        device : {"AUTO", "CPU", "CUDA"}
-        exact : bool
-            Compute in float32 on every device.
-
-        Raises
-        ------
-        ModelError
-            There is no CUDA device, or the weights are not those of FRPDF.
+        Raises ModelError if there is no CUDA device, or the weights are not those of FRPDF.
         """
         super().__init__()
         chosen = device_of(device)

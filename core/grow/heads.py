@@ -1,4 +1,7 @@
-"""What the growth looks at: the points that the classification finds on heads, and the heads in a window of them."""
+"""What the growth looks at: the points that the classification finds on heads, and the heads in a window of them.
+
+It is given the track, the user's tolerances, and those that depend on the cloud.
+"""
 
 from __future__ import annotations
 
@@ -9,12 +12,13 @@ from itertools import product
 import numpy as np
 from scipy.spatial import cKDTree
 
+from ..classify import settings as classify
 from ..classify.flush import BESIDE_M, HEAD_LEVEL_M
 from ..classify.sharpness import is_blunt, is_decided
 from ..classify.square import classify_square
+from ..parameters import GrowParameters
 from ..polyline import Feet, Polyline
 from ..rails import SearchFigures
-from .settings import BLUNT, DENSE, THIN, Beam, GrowSettings
 
 Key = tuple[int, int]
 
@@ -26,19 +30,93 @@ CROWN_SHARE = 0.7
 
 
 @dataclass(frozen=True)
-class Head:
-    """A head in a window.
+class Beam:
+    """Tolerances across and in height, metres.
 
     Attributes
     ----------
-    across_m : float
-        Place of its axis, to the left.
-    top_m : float
-        Height of its top.
-    count : int
-        Points on it.
-    alone : bool
-        Whether no other head touches it.
+    gap_m : float
+        Distance across between points of two heads; those of one are closer. A flangeway is 35 mm wide and more.
+    beside_m : float
+        Distance beyond the side of a head up to which the classification labels its points.
+    below_m, above_m : float
+        Heights of rail points relative to the top.
+    widen_m : float
+        Added to either side of the user's strip; the beam is as wide.
+    level_m : float
+        Added to the user's tolerance in height between windows.
+    sigma_m : float
+        Accuracy across of a window.
+    fit_m, smooth_m : float
+        Length over which a course is fitted, and half the length over which the axis is smoothed.
+    """
+
+    gap_m: float
+    beside_m: float
+    below_m: float
+    above_m: float
+    widen_m: float
+    level_m: float
+    sigma_m: float
+    fit_m: float
+    smooth_m: float
+
+
+DENSE = Beam(
+    gap_m=0.025,
+    beside_m=0.008,
+    below_m=0.040,
+    above_m=0.025,
+    widen_m=0.0,
+    level_m=0.0,
+    sigma_m=0.005,
+    fit_m=5.0,
+    smooth_m=1.5,
+)
+"""For scanners on vehicles: beams of a few millimetres, range noise up to 5 mm."""
+
+THIN = Beam(
+    gap_m=0.10,
+    beside_m=0.06,
+    below_m=0.055,
+    above_m=0.040,
+    widen_m=0.02,
+    level_m=0.20,
+    sigma_m=0.020,
+    fit_m=10.0,
+    smooth_m=3.0,
+)
+"""For scanners in the air: a beam of 4 to 9 cm blends the head and the ballast. Height only has to tell a rail from one
+on a bridge: measured on blunt heads, tops are up to 0.15 m off their course."""
+
+BLUNT = replace(THIN, below_m=classify.BLUNT.below_m, above_m=classify.BLUNT.above_m)
+"""For clouds that blur a head to a round ridge."""
+
+
+@dataclass(frozen=True)
+class GrowSettings:
+    """What the user chooses."""
+
+    gauge_m: float
+    head_width_m: float
+    parameters: GrowParameters = GrowParameters()
+
+    @property
+    def spacing_m(self) -> float:
+        """Distance of the two heads of a track."""
+        return self.gauge_m + self.head_width_m
+
+    @property
+    def classification(self) -> classify.Settings:
+        """Settings of the classification whose points are followed."""
+        return classify.Settings((self.gauge_m,), self.head_width_m, low_m=self.parameters.min_height_m)
+
+
+@dataclass(frozen=True)
+class SeenHead:
+    """A head in a window: place of its axis to the left, height of its top, and number of points on it.
+
+    It is `alone` if no other head touches it.
     """
 
     across_m: float
@@ -49,14 +127,9 @@ class Head:
 
 @dataclass(frozen=True)
 class Rail:
-    """A rail that was followed.
+    """A rail that was followed: its axis on the top of the head, (k, 3), and the windows in which it was seen, (k,).
 
-    Attributes
-    ----------
-    xyz : (k, 3) array
-        Its axis on the top of the head, a place for each window from the first one in which it was seen to the last.
-    seen : (k,) bool array
-        Windows in which it was seen.
+    There is a place for each window from the first one in which the rail was seen to the last.
     """
 
     xyz: np.ndarray
@@ -71,13 +144,10 @@ class Rail:
 
 def heads_in(
     across_m: np.ndarray, height_m: np.ndarray, settings: GrowSettings, beam: Beam, least: float = MIN_POINTS
-) -> list[Head]:
+) -> list[SeenHead]:
     """List the heads in a window with as many points or more: one for each group of points, or two that touch.
 
-    Parameters
-    ----------
-    across_m, height_m : (n,) arrays
-        Points on heads: places across and heights.
+    Points on heads are given by places across and heights, (n,) each.
     """
     order = np.argsort(across_m, kind="stable")
     across_m, height_m = across_m[order], height_m[order]
@@ -87,7 +157,7 @@ def heads_in(
     return [head for head in found if head.count >= least]
 
 
-def _heads_of(across_m: np.ndarray, height_m: np.ndarray, half_m: float, beam: Beam) -> list[Head]:
+def _heads_of(across_m: np.ndarray, height_m: np.ndarray, half_m: float, beam: Beam) -> list[SeenHead]:
     """Measure the head that a group of points is on, or the two at its sides if it is wider."""
     spare_m = (across_m[-1] - across_m[0]) / 2 - half_m - beam.beside_m
     if spare_m <= 0:
@@ -100,7 +170,7 @@ def _heads_of(across_m: np.ndarray, height_m: np.ndarray, half_m: float, beam: B
         off = np.abs(across_m - place_m)
         crown = height_m[off <= CROWN_SHARE * half_m]
         top_m = float(np.median(crown if len(crown) else height_m))
-        heads.append(Head(place_m, top_m, int((off <= half_m + beam.beside_m).sum()), len(places) == 1))
+        heads.append(SeenHead(place_m, top_m, int((off <= half_m + beam.beside_m).sum()), len(places) == 1))
     return heads
 
 
@@ -119,10 +189,7 @@ class _Square:
 class OnHeads:
     """The points on heads by the classification; squares are classified when they are reached, and once.
 
-    Parameters
-    ----------
-    read : callable
-        Returns the points, (n, 3) metres, of the square of the classification in a column and row, with its margin.
+    `read` returns the points, (n, 3) metres, of the square of the classification in a column and row, with its margin.
     """
 
     def __init__(self, read: Callable[[Key], np.ndarray], settings: GrowSettings) -> None:

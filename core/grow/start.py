@@ -1,4 +1,7 @@
-"""From a seed to the rail under it: its direction, its height, and on which side the other rail of the track is."""
+"""From a seed to the rail under it: its direction and height, the course where it leads, and the side of its partner.
+
+The course is the smooth curve through the last windows.
+"""
 
 from __future__ import annotations
 
@@ -6,9 +9,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .course import Ahead
-from .heads import Head, OnHeads, heads_in
-from .settings import DENSE, Beam, GrowSettings
+from .heads import DENSE, Beam, GrowSettings, OnHeads, SeenHead, heads_in
+
+LEAST_RADIUS_M = 20.0
+"""Least radius of a railway: trams; a course can't leave the expected one faster."""
+
+TYPICAL_RADIUS_M = 50.0
+"""Radius at which one standard deviation of curvature is expected before any is measured."""
+
+GRADE_LENGTH_M = 3.0
+"""Length behind the end that gives the gradient."""
 
 ANGLES = 90
 """Directions that are tried, over half a turn: at 1 m, a head is 17 mm off at most."""
@@ -39,21 +49,79 @@ TARGET_POINTS, LONGEST_WINDOW_M = 12, 2.0
 
 
 @dataclass(frozen=True)
-class Start:
-    """A rail found at a seed.
+class Ahead:
+    """Where a rail is expected, `xy` (2,), and in which direction, a unit vector."""
 
-    Attributes
-    ----------
-    xyz : (k, 3) array
-        Places on its axis, in order.
-    heading : (2,) array
-        Unit vector along it.
-    per_m : float
-        Points on the head per metre.
-    side : int
-        1 if the other rail of the track is to the left, -1 to the right, 0 if none was found.
-    level_m : float
-        Height of the other rail above this one.
+    xy: np.ndarray
+    z: float
+    heading: np.ndarray
+    curvature: float
+    grade: float
+
+    @property
+    def left(self) -> np.ndarray:
+        """Unit vector to the left."""
+        return np.array([-self.heading[1], self.heading[0]])
+
+    def coordinates(self, xyz: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return places of points along, across to the left of, and above the expected course."""
+        step = xyz[:, :2] - self.xy
+        along, across = step @ self.heading, step @ self.left
+        return along, across - self.curvature * along**2 / 2, xyz[:, 2] - self.z - self.grade * along
+
+    def beside(self, left_m: float, up_m: float) -> Ahead:
+        """Return the expected course of something beside."""
+        curvature = self.curvature / (1 - self.curvature * left_m)
+        return Ahead(self.xy + left_m * self.left, self.z + up_m, self.heading, curvature, self.grade)
+
+
+def lead(xyz: np.ndarray, step_m: float, heading: np.ndarray, beam: Beam) -> Ahead:
+    """Continue a course by `step_m`, given places on the axis in order, (n, 3), and a unit vector roughly along it."""
+    end = xyz[-1]
+    step = xyz[:, :2] - end[:2]
+    along = step @ heading
+    near = along >= -beam.fit_m
+    along, across = along[near], (step @ np.array([-heading[1], heading[0]]))[near]
+    prior = beam.sigma_m * 2 * TYPICAL_RADIUS_M
+    design = np.column_stack([np.ones_like(along), along, along**2])
+    design, wanted = np.vstack([design, [0.0, 0.0, prior]]), np.append(across, 0.0)
+    offset, slope, bend = np.linalg.lstsq(design, wanted, rcond=None)[0]
+    tangent = slope + 2 * bend * step_m
+    root = np.hypot(1.0, tangent)
+    left = np.array([-heading[1], heading[0]])
+    place = end[:2] + step_m * heading + (offset + slope * step_m + bend * step_m**2) * left
+    grade, z = _grade(xyz[near, 2], along)
+    return Ahead(place, z + grade * step_m, (heading + tangent * left) / root, 2 * bend / root**3, grade)
+
+
+def _grade(z: np.ndarray, along: np.ndarray) -> tuple[float, float]:
+    """Return the gradient at the end of a course and its height there."""
+    near = along >= -GRADE_LENGTH_M
+    along, z = along[near], z[near]
+    if len(along) < 3:
+        return 0.0, float(z[-1])
+    grade, end = np.polyfit(along, z, 1)
+    return float(grade), float(end)
+
+
+def smoothed(xyz: np.ndarray, along_m: np.ndarray, reach_m: float, seen: np.ndarray) -> np.ndarray:
+    """Fit a parabola through the places within `reach_m` of each one that were seen, (n, 3); the others as they are."""
+    result = xyz.copy()
+    firsts = np.searchsorted(along_m, along_m - reach_m)
+    lasts = np.searchsorted(along_m, along_m + reach_m, side="right")
+    for number, place_m in enumerate(along_m):
+        near = firsts[number] + np.flatnonzero(seen[firsts[number] : lasts[number]])
+        if len(near) > 3 and seen[number]:
+            result[number] = np.polyfit(along_m[near] - place_m, xyz[near] - xyz[number], 2)[-1] + xyz[number]
+    return result
+
+
+@dataclass(frozen=True)
+class Start:
+    """A rail found at a seed: places on its axis, (k, 3), in order, a unit vector along it, and points per metre.
+
+    `side` is 1 if the other rail of the track is to the left, -1 to the right, 0 if none was found; `level_m` is the
+    height of the other rail above this one.
     """
 
     xyz: np.ndarray
@@ -138,7 +206,7 @@ def _per_m(near: np.ndarray, ahead: Ahead, reach_m: float, settings: GrowSetting
 
 def _windows(
     near: np.ndarray, ahead: Ahead, reach_m: float, beam: Beam, settings: GrowSettings
-) -> tuple[np.ndarray, list[Head]]:
+) -> tuple[np.ndarray, list[SeenHead]]:
     """Measure the head in five windows along a line; returns the places along and the heads of those that show it."""
     along, across, height = ahead.coordinates(near)
     stations, heads = [], []
@@ -153,7 +221,7 @@ def _windows(
     return np.array(stations), heads
 
 
-def _aligned(ahead: Ahead, stations: np.ndarray, heads: list[Head]) -> Ahead:
+def _aligned(ahead: Ahead, stations: np.ndarray, heads: list[SeenHead]) -> Ahead:
     """Lay a line through heads."""
     slope, offset = np.polyfit(stations, [head.across_m for head in heads], 1)
     grade, top = np.polyfit(stations, [head.top_m for head in heads], 1)

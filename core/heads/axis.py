@@ -12,8 +12,7 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d
 
 from ..rails import Support
-from .edgeless import FLANK_TOP_SIGMA_M, Flank, Ridge, find_flank
-from .edges import EDGE_SIGMA_M, VIEW_STATIONS, edge_middles
+from .edges import EDGE_SIGMA_M, FLANK_TOP_SIGMA_M, VIEW_STATIONS, Flank, Ridge, edge_middles, find_flank
 from .head_points import MIN_ON_HEAD, STATION_STEP_M, HeadPoints
 from .level import robust_sigma
 from .roads import MIN_WIDER_M, bands, hidden_edges
@@ -45,22 +44,12 @@ def unseen_m(cell_m: float) -> float:
 
 @dataclass(frozen=True)
 class Shown:
-    """What points show of a head at each station of its line, (s,) each.
+    """What points show of a head at each station of its line, (s,) each; lengths in metres.
 
-    Attributes
-    ----------
-    t : float
-        Chainage, see `HeadPoints.stations`.
-    points : int
-        Points on top that are nearest to the station.
-    offset_m, information : float
-        Offset of the axis to the left of the line, and the inverse of its variance by chance, 1/m²; 0 where these
-        points show nothing.
-    common_m : float
-        Part of the standard error that more points would not reduce. Along an `Axis`: the part of it that its smoothed
-        course keeps.
-    outline : Middles
-        What the outline of the head shows.
+    Chainages `t` are those of `HeadPoints.stations`; `points` on top are nearest to the station. They show the offset
+    of the axis to the left of the line, and `information` is the inverse of its variance by chance, 1/m², 0 where these
+    points show nothing. `common_m` is the part of the standard error that more points would not reduce; along an
+    `Axis`, the part of it that its smoothed course keeps.
     """
 
     t: np.ndarray
@@ -73,17 +62,10 @@ class Shown:
 
 @dataclass(frozen=True)
 class Axis:
-    """The axis of a head along its line.
+    """The axis of a head along its line: its offset to the left, and the standard error of this by chance.
 
-    Attributes
-    ----------
-    course : Spline
-        Its offset to the left of the line, and the standard error of this offset by chance.
-    shown : Shown
-    flank : Flank or None
-        The head, where its points show one face alone.
-    ridge : Ridge or None
-        The crest, where the head is blunt.
+    It has a `flank` where the points show one face of the head alone, and a `ridge`, the crest, where the head is
+    blunt.
     """
 
     course: Spline
@@ -93,16 +75,10 @@ class Axis:
 
     @classmethod
     def of(cls, points: HeadPoints, unseen_m: float, by_outline: bool = True) -> Axis:
-        """Measure the axis.
+        """Measure the axis, given points at the own level of the line.
 
-        Parameters
-        ----------
-        points : HeadPoints
-            At the own level of the line.
-        unseen_m : float
-            Standard deviation of the line where points show no edges of the head.
-        by_outline : bool
-            Whether the line is close enough to its head to compare the points with the outline.
+        `unseen_m` is the standard deviation of the line where points show no edges of the head; `by_outline` says that
+        the line is close enough to its head to compare the points with the outline.
         """
         flank = find_flank(points)
         is_band = flank is not None or _is_narrow(points)

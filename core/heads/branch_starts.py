@@ -47,17 +47,9 @@ def slide_branches(network: LineNetwork, xyz: np.ndarray, head_width_m: float, s
 
     The distance between axes that part on an arc grows with the square of the way, that next to a straight blade, as
     American switches have, in proportion to it. Both fit where the heads are apart, but the arc begins metres before
-    the blade. Where the points show no head next to the stock rail there, it is a blade. Branches that part in any
-    other way stay unchanged.
-
-    Parameters
-    ----------
-    network : LineNetwork
-    xyz : (k, 3) array
-        Rail points in order of x.
-    head_width_m : float
-    sure_m : float
-        Distance between the axes from which both lines are reliable.
+    the blade. Where the points, `xyz` (k, 3) in order of x, show no head next to the stock rail there, it is a blade.
+    Branches that part in any other way stay unchanged. `sure_m` is the distance between the axes from which both lines
+    are reliable.
     """
     between_m = sure_m, PARTED_HEADS * head_width_m
     starts = [
@@ -76,20 +68,11 @@ def slide_branches(network: LineNetwork, xyz: np.ndarray, head_width_m: float, s
 
 @dataclass(frozen=True)
 class _Parting:
-    """How a line parts from the one that passes its node.
+    """How a line parts from the one that passes its node, number `stock`, at chainage `node_m` of it.
 
-    Attributes
-    ----------
-    node_m : float
-        Chainage of the node on the other line.
-    stock, sense : int, float
-        Number of the other line, and the direction along it in which this one leaves, 1 or -1.
-    way, apart : (n,) arrays
-        Way along the other line from the node, and distance between the axes, in the part that shows the parting.
-    left : float
-        Side on which this line leaves, 1 for the left.
-    kept : int
-        Vertex of this line, from its end, at the first of these places.
+    `sense` is the direction along the other line in which this one leaves, 1 or -1, and `left` the side, 1 for the
+    left. `way` and `apart`, (n,), are the way along the other line from the node and the distance between the axes, in
+    the part that shows the parting; `kept` is the vertex of this line, from its end, at the first of these places.
     """
 
     node_m: float

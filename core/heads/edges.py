@@ -1,6 +1,9 @@
-"""Edges of the railhead and the middle between them, from histograms of points across the line.
+"""Edges of the railhead and the middle between them, from histograms of points across the line; and heads without both.
 
-See docs/method.md section 6.2.
+Edges are those of docs/method.md section 6.2. A polished crown may return nothing, and a low scanner sees none: the
+points then form a band as narrow as their noise, and as high as a face, half a head off the axis. Beams from the air
+and dense matching of photographs blur a head to a ridge, which is a parabola across; its crest is the axis. See
+docs/method.md sections 6.7 and 6.10.
 """
 
 from __future__ import annotations
@@ -10,7 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from .head_points import BLUR_BINS, HALF_HEAD_BINS, HALF_RANGE_BINS, HeadPoints
+from .head_points import BLUR_BINS, HALF_HEAD_BINS, HALF_RANGE_BINS, MIN_ON_HEAD, HeadPoints
+from .level import OFF_TOP_SIGMAS, SLOPE_ROUNDS, robust_sigma, rough_level
+from .outline import FACE_DEPTH_M, Grid, Outline, fit_section, log_likelihood
 
 MAX_SHIFT_BINS = 15
 """Largest shift of a line, about 3 cm: half a cell of the raster and a little noise."""
@@ -46,24 +51,54 @@ on the view. Seen from above a track, the left and the right corner differ by 1.
 EDGE_ROUNDS = 2
 """The first round finds out how the scanner sees the head, the second uses the edges that count."""
 
+MAX_BAND_SHARE, BAND_PERCENTILES = 0.4, (5.0, 95.0)
+"""Width of a band, in head widths and between these percentiles, that may be a face: noise of 8 mm makes it 26 mm."""
+
+MIN_HEIGHT_M = 0.012
+"""Height of such a band, between the same percentiles and beyond its width: a face is 22 mm high."""
+
+TOP_ABOVE_M = 0.022
+"""Height of the top above the middle of a face and its corner."""
+
+MIN_GAIN = 6.0
+"""Gain of the log-likelihood from which a face is preferred to a crown, and one side to the other: odds of 400."""
+
+FLANK_SIGMA_M = 0.0012
+"""Standard error of the axis from one face: half of what head widths differ by, and a millimetre because the slope
+across of the head is not seen."""
+
+FLANK_TOP_SIGMA_M = 0.0012
+"""Standard error of the top from one face: where the face ends below depends on the rail and on the view."""
+
+REACH_HEADS = 1.0
+"""Distance from the line, in head widths, within which the ridge is a parabola: a Gaussian of 7 cm is, to a tenth."""
+
+WINDOW = 33
+"""Stations that share one crest, 8.25 m: 16 mm of noise moves the crest by 3 mm over this length, and by 6 mm over 2 m.
+The line itself follows curves; only its offsets are averaged."""
+
+MIN_BEND = 0.5
+"""Least bend of the parabola, 1/m: a radius of 2 m. A flatter top has no crest."""
+
+CREST_SIGMA_M = 0.003
+"""Standard error of a crest that more points would not reduce: a blur of 4 cm blends a head with ballast that is higher
+by 2 or 3 cm on one side, and an oblique beam with what it sees on its own side of the rail."""
+
+TILT = 0.035
+"""Standard deviation of the slope across of tracks, whose cant is up to 90 mm. A blurred head does not show it, and its
+crest moves to the higher side, by slope over bend."""
+
+LEANING_M = 0.008
+"""Standard deviation of the mean of the points about the crest: labels lean to the side on which the bed is higher.
+Where noise hides the crest, the mean says more."""
+
 
 def edge_middles(points: HeadPoints, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Find the middle between the edges of a head at its stations.
+    """Find the middle between the edges of a head at its stations; `free`, (2, s), says where either can be seen.
 
-    The densities come from the long windows, because the scanner's view of the head changes slowly along the line.
-
-    Parameters
-    ----------
-    points : HeadPoints
-    free : (2, s) bool array
-        Where the right and the left edge can be seen.
-
-    Returns
-    -------
-    offset_m : (s,) array
-        Metres to the left of the line; NaN where no edges are visible.
-    information : (s,) array
-        Inverse of its variance that the points next to a station alone contribute, 1/m².
+    Returns metres to the left of the line, (s,), NaN where no edges are visible, and the inverse of the variance that
+    the points next to a station alone contribute, (s,) 1/m². The densities come from the long windows, because the
+    scanner's view of the head changes slowly along the line.
     """
     (top, noise_m), (counts, wide_counts) = points.top, points.histograms
     bin_m, wide = points.width_m / (2 * HALF_HEAD_BINS), np.maximum(wide_counts.sum(axis=1), 1)
@@ -78,16 +113,9 @@ def edge_middles(points: HeadPoints, free: np.ndarray) -> tuple[np.ndarray, np.n
 def _information(density: np.ndarray, weight: np.ndarray, noise_m: float, blur_m: float) -> np.ndarray:
     """Return the inverse of the variance of the middle between both edges that is due to chance, (s,) 1/m².
 
-    An edge is where the blurred density falls to half. There the density has, like any count, the variance density /
-    (4 √π blur), and it falls by density / (√2π spread) per metre; the spread of the edge comes from blur and noise.
-
-    Parameters
-    ----------
-    density : (2, s) array
-        Points per metre across, just inside the edges.
-    weight : (2, s) array
-        Weights of the edges.
-    noise_m, blur_m : float
+    An edge, of the given weight, (2, s), is where the blurred density, (2, s) points per metre across, falls to half.
+    There the density has, like any count, the variance density / (4 √π blur), and it falls by density / (√2π spread)
+    per metre; the spread of the edge comes from blur and noise.
     """
     spread_m = np.hypot(blur_m, noise_m)
     variance = np.sqrt(np.pi) * spread_m**2 / (2 * blur_m * np.maximum(density, 1e-9))
@@ -98,16 +126,10 @@ def _information(density: np.ndarray, weight: np.ndarray, noise_m: float, blur_m
 class Edges:
     """Right and left edge of the head in s windows.
 
-    Attributes
-    ----------
-    density : (2, s) array
-        Points per bin just inside the edge.
-    weight : (2, s) array
-        0 to 1: the edge that faces the scanner counts fully, while the corner of the other is hardly visible.
-    seen : (s,) bool array
-        Whether the edges that count are visible.
-    inset : (s,) array
-        Correction of a middle found from one edge alone, in bins to the left: the round corner hides part of the head.
+    `density`, (2, s), is in points per bin just inside the edge. `weight`, (2, s), is 0 to 1: the edge that faces the
+    scanner counts fully, while the corner of the other is hardly visible; `seen`, (s,), holds where the edges that
+    count are visible. `inset`, (s,), corrects a middle found from one edge alone, in bins to the left: the round corner
+    hides part of the head.
     """
 
     density: np.ndarray
@@ -194,3 +216,102 @@ class CrossSections:
 def _excess(density: np.ndarray) -> np.ndarray:
     """Return the relative excess of density at the other edge, (2, s)."""
     return density[::-1] / np.maximum(density, 1e-6) - 1
+
+
+@dataclass(frozen=True)
+class Flank:
+    """A head that shows one face: offset of the axis to the left of the line, and top above the level of the points.
+
+    `sigma_m` is the standard error of the axis; half a head where the points may be on either face, and the axis is
+    then stated to be on them.
+    """
+
+    left_m: float
+    top_m: float
+    sigma_m: float
+
+
+def find_flank(points: HeadPoints) -> Flank | None:
+    """Find the head of a line whose points are on one face; None if they are not."""
+    across, head_width_m = points.across, points.width_m
+    if len(across) < MIN_ON_HEAD:
+        return None
+    low, high = np.percentile(across, BAND_PERCENTILES)
+    if high - low > MAX_BAND_SHARE * head_width_m:
+        return None
+    up = points.z - rough_level(points.t, points.z)
+    bottom, top = np.percentile(up, BAND_PERCENTILES)
+    if top - bottom < high - low + MIN_HEIGHT_M or top - bottom > 2 * FACE_DEPTH_M:
+        return None
+    middle, half = float(np.median(across)), 0.5 * head_width_m
+    grid, outline = Grid.of(head_width_m), Outline.of(head_width_m)
+    found = []
+    for left_m, top_m in ((middle, 0.0), (middle - half, TOP_ABOVE_M), (middle + half, TOP_ABOVE_M)):
+        bins = grid.number(across - left_m, up - top_m)
+        counts = np.bincount(bins[bins >= 0], minlength=grid.size).astype(float)
+        section = fit_section(counts, outline, grid)
+        strays = (len(up) - counts.sum()) * np.log(section.shares[-1] / grid.size)
+        found.append((log_likelihood(counts, section, outline, grid) + strays, left_m, top_m, section))
+    crown, *faces = found
+    other, best = sorted(faces, key=lambda one: one[0])
+    if best[0] - crown[0] < MIN_GAIN:
+        return None
+    _, left_m, top_m, section = best
+    top_m += float(section.place[1])
+    if best[0] - other[0] < MIN_GAIN:
+        return Flank(middle, top_m, half)
+    return Flank(left_m + float(section.place[0]), top_m, FLANK_SIGMA_M)
+
+
+@dataclass(frozen=True)
+class Ridge:
+    """The crest of a blunt head along its line, at equidistant chainages as in `HeadPoints.stations`, (s,) each.
+
+    `offset_m` is the offset of the crest to the left of the line that the points next to a station alone show, and
+    `information` the inverse of its variance by the noise of single points, 1/m², 0 where no points are near.
+    `common_m` is the standard error that more points would not reduce.
+    """
+
+    t: np.ndarray
+    offset_m: np.ndarray
+    information: np.ndarray
+    common_m: np.ndarray
+
+    @classmethod
+    def find(cls, points: HeadPoints) -> Ridge | None:
+        """Fit one parabola, and a crest for each window, to the points of a line; None without any, or if not blunt."""
+        near = points[points.within(REACH_HEADS)]
+        if not points.is_blunt or not len(near.t):
+            return None
+        row, rows = near.station, len(near.stations)
+        x, up = near.across, near.z - rough_level(near.t, near.z)
+        used = np.ones(len(x), dtype=bool)
+        for _ in range(SLOPE_ROUNDS):
+            bend = max(-2 * float(np.polynomial.polynomial.polyfit(x[used], up[used], 2)[2]), MIN_BEND)
+            flat = up + 0.5 * bend * x**2
+            noise_m = robust_sigma(flat[used])
+            level, slope, crest, information = _crests(row[used], rows, x[used], flat[used], bend, noise_m)
+            used = np.abs(flat - level[row] - slope[row] * x) <= OFF_TOP_SIGMAS * noise_m
+        return cls(near.stations, crest, information, np.full(rows, np.hypot(CREST_SIGMA_M, TILT / bend)))
+
+
+def _crests(
+    row: np.ndarray, rows: int, x: np.ndarray, flat: np.ndarray, bend: float, noise_m: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Fit level and slope across to the points of each window, and the crest to those of each station, (rows,) each.
+
+    The fourth array is the information about the crest, 1/m²: from the offsets of the points about their mean, and from
+    the prior of the window, by which the crest is at this mean.
+    """
+    sums = np.array([np.bincount(row, one, rows) for one in (np.ones_like(x), x, flat, x * x, x * flat)])
+    count, sx, sy, xx, xy = uniform_filter1d(sums, WINDOW, axis=1, mode="constant") * WINDOW
+    count = np.where(count > 0.5, count, np.inf)
+    mean, level = sx / count, sy / count
+    prior_m2 = (noise_m / bend / LEANING_M) ** 2
+    slope = (xy - mean * sy + prior_m2 * bend * mean) / (xx - mean * sx + prior_m2)
+    points, sx, sy, xx, xy = sums
+    own_prior = prior_m2 / WINDOW * (count < np.inf)
+    spread = xx - 2 * mean * sx + points * mean**2 + own_prior
+    product = xy - mean * sy - level * sx + points * mean * level + own_prior * bend * mean
+    crest = product / (bend * np.maximum(spread, 1e-12))
+    return level - slope * mean, slope, crest, spread * (bend / noise_m) ** 2

@@ -227,17 +227,9 @@ def near_lines(
     progress: Progress = SILENT,
     blunt: bool | None = None,
 ) -> list[HeadPoints]:
-    """Find the points of each line.
+    """Find the points of each line, (k, 2); `widths`, metres, are those of all heads or of each.
 
-    Parameters
-    ----------
-    lines : sequence of (k, 2) arrays
-    xyz : (n, 3) array
-    widths : float or (l,) array
-        Width of the heads, of all lines or of each, metres.
-    strips, blunt
-        See `RailPoints`; if it is not known whether the cloud blunts heads, these lines show it.
-    progress : Progress
+    If it is not known whether the cloud blunts heads, these lines show it.
     """
     feet = project(lines, xyz[:, :2], HALF_RANGE_BINS / (2 * HALF_HEAD_BINS) * widest(widths), progress)
     free = free_edges(lines, widest(widths))
@@ -268,19 +260,9 @@ def _are_blunt(heads: Sequence[HeadPoints]) -> bool:
 
 
 def free_edges(lines: Sequence[np.ndarray], head_width_m: float) -> list[np.ndarray]:
-    """Find the stations of each line where the right and the left edge of its head are free of other heads.
+    """Return where the right and the left edge of each head are free of other heads, (2, s) at the line's stations.
 
     Where a branch leaves its stock rail the heads overlap, and only the outer edge of each is free.
-
-    Parameters
-    ----------
-    lines : sequence of (n, 2) arrays
-    head_width_m : float
-
-    Returns
-    -------
-    list of (2, s) bool arrays
-        For each line, the right and the left edges at its stations.
     """
     free = [np.ones((2, len(stations_along(Polyline(line).length_m))), dtype=bool) for line in lines]
     for line, station, across in _close_runs(lines, BESIDE_HEADS * head_width_m):

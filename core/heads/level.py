@@ -39,19 +39,10 @@ MIN_NOISE_M = 0.001
 
 
 def rough_level(t: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """Return the height of most points around each point: medians of short bins, filtered by a running median.
+    """Return the height of most points around each point, (n,): medians of short bins, filtered by a running median.
 
-    The trend of the line is removed before and added again, so that the ends of a gradient are kept.
-
-    Parameters
-    ----------
-    t : (n,) array
-        Chainage in metres, increasing.
-    z : (n,) array
-
-    Returns
-    -------
-    (n,) array
+    Chainages `t`, metres, increase. The trend of the line is removed before and added again, so that the ends of a
+    gradient are kept.
     """
     number = np.floor((t - t[0]) / LEVEL_BIN_M).astype(int)
     first = np.concatenate([[0], np.flatnonzero(np.diff(number)) + 1])
@@ -65,13 +56,8 @@ def rough_level(t: np.ndarray, z: np.ndarray) -> np.ndarray:
 def medians(values: np.ndarray, first: np.ndarray, count: np.ndarray) -> np.ndarray:
     """Return the median of each group of successive values, (k,); of an even number, the upper one of the middle two.
 
-    Sorting short rows is several times as fast as sorting all values by their group.
-
-    Parameters
-    ----------
-    values : (n,) array
-    first, count : (k,) int arrays
-        First value and number of values of each group, at least one; the groups follow each other without gaps.
+    Groups, given by first value and number, follow each other without gaps. Sorting short rows is several times as fast
+    as sorting all values by their group.
     """
     found = np.empty(len(count))
     order = np.argsort(count, kind="stable")
@@ -91,22 +77,9 @@ def robust_sigma(values: np.ndarray) -> float:
 
 
 def cross_slope(t: np.ndarray, across: np.ndarray, height: np.ndarray, head_width_m: float) -> np.ndarray:
-    """Fit the slope of the top across the head, which comes from cant and from the inclination of the rail.
+    """Fit the slope of the top across the head, rise per metre to the left, (n,), due to cant and inclination.
 
-    Parameters
-    ----------
-    t : (n,) array
-        Chainage in metres, increasing.
-    across : (n,) array
-        Offset to the left of the head's axis, metres.
-    height : (n,) array
-        Metres above the rough level.
-    head_width_m : float
-
-    Returns
-    -------
-    (n,) array
-        Rise per metre to the left, at each point.
+    Points are given by chainage, increasing, offset to the left of the axis, and height above the rough level, metres.
     """
     crown = np.abs(across) <= CROWN_SHARE * head_width_m
     limit = OFF_TOP_SIGMAS * robust_sigma(height[crown])

@@ -92,17 +92,10 @@ SHARE_DOUBT = 2e-5
 class Outline:
     """The outline of a head, and the parts of it that have a share of the points each.
 
-    Attributes
-    ----------
-    left, up : (j,) arrays
-        Samples: metres to the left of the axis and above the top.
-    widening : (j,) array
-        How far each sample moves to the left if the head is a metre wider.
-    falling : (j,) array
-        How far each sample falls per bend of the crown, m².
-    parts : (k, j) array
-        Points of each part by sample; rows sum to 1. The first parts are what is seen of the crown and the upper
-        corners from each view, the others are the lower corners and the faces, which classifications may leave out.
+    Samples, (j,), are `left` of the axis and `up` above the top, metres. `widening` is how far each moves to the left
+    if the head is a metre wider, `falling` how far it falls per bend of the crown, m². `parts`, (k, j), are the points
+    of each part by sample; rows sum to 1. The first parts are what is seen of the crown and the upper corners from each
+    view, the others are the lower corners and the faces, which classifications may leave out.
     """
 
     left: np.ndarray
@@ -181,13 +174,9 @@ def _bins(first: float, last: float) -> np.ndarray:
 class Section:
     """The head in one section of a line.
 
-    Attributes
-    ----------
-    place : (7,) array
-        Offset of the axis to the left, height of the top, slope across, excess of the head width, the logarithms of the
-        noise across and in height, and the excess of the bend of the crown, 1/m; lengths in metres.
-    shares : (k + 1,) array
-        Share of the points of each part, and of those on none.
+    `place`, (7,), has the offset of the axis to the left, height of the top, slope across, excess of the head width,
+    the logarithms of the noise across and in height, and the excess of the bend of the crown, 1/m; lengths in metres.
+    `shares`, (k + 1,), are the shares of the points of each part, and of those on none.
     """
 
     place: np.ndarray
@@ -196,19 +185,11 @@ class Section:
 
 @dataclass(frozen=True)
 class Blurred:
-    """An outline at a place, blurred by noise.
+    """An outline at a place, blurred by noise across and in height, (2,) metres.
 
-    Attributes
-    ----------
-    outline : Outline
-    across, height : (x, j), (j, y) arrays
-        Densities of each sample in the bins across and in height.
-    off, above : (x, j), (j, y) arrays
-        Distance of the bins from each sample in standard deviations of the noise.
-    noise : (2,) array
-        Across and in height, metres.
-    parts : (k + 1, b) array
-        Density of each part by bin, and of strays.
+    `across`, (x, j), and `height`, (j, y), are the densities of each sample in the bins; `off` and `above`, of the same
+    shapes, are the distances of the bins from each sample in standard deviations of the noise. `parts`, (k + 1, b), is
+    the density of each part by bin, and of strays.
     """
 
     outline: Outline
@@ -253,18 +234,10 @@ class Blurred:
 
 
 def fit_section(counts: np.ndarray, outline: Outline, grid: Grid, start: Section | None = None) -> Section:
-    """Find the place of a head and the shares of its parts that explain the points best.
+    """Find the place of a head and the shares of its parts that explain the points in each bin, (b,), best.
 
-    Shares follow by expectation maximization, the place together with the shares by Fisher scoring.
-
-    Parameters
-    ----------
-    counts : (b,) array
-        Points in each bin.
-    outline : Outline
-    grid : Grid
-    start : Section, optional
-        An estimate, such as that of the section before.
+    Shares follow by expectation maximization, the place together with the shares by Fisher scoring. `start` is an
+    estimate, such as that of the section before.
     """
     section = start if start is not None else _start(outline)
     used = counts > 0
@@ -370,15 +343,10 @@ def _moved(section: Section, step: np.ndarray) -> Section:
 class Scores:
     """What each bin contributes to the offset and the height of a head, and how well the section knows both.
 
-    Attributes
-    ----------
-    by_bin : (2, b) array
-        Derivatives of the log-likelihood of a point with respect to the offset and the height, 1/m, each less what a
-        wrong value of the other or a wrong slope across would add to it.
-    per_point : float
-        Information about the height that a point has on average, 1/m².
-    common_m : (2,) array
-        Standard errors of both in the section that more points next to a station would not reduce.
+    `by_bin`, (2, b), are derivatives of the log-likelihood of a point with respect to the offset and the height, 1/m,
+    each less what a wrong value of the other or a wrong slope across would add to it. `per_point` is the information
+    about the height that a point has on average, 1/m², and `common_m`, (2,), are the standard errors of both in the
+    section that more points next to a station would not reduce.
     """
 
     by_bin: np.ndarray

@@ -76,20 +76,8 @@ def onto_heads(
 ) -> tuple[np.ndarray, ...]:
     """Move lines in the middle of road and head onto the heads, where one end of the band is at gauge.
 
-    Parameters
-    ----------
-    lines : sequence of (n, 2) arrays
-        Smoothed lines.
-    points : RailPoints
-    heads_m : (n,) array
-        Width of the head of each line.
-    spacings_m : sequence of float
-        Distances between the axes of the two rails of a track.
-
-    Returns
-    -------
-    tuple of (n, 2) arrays
-        Other lines stay as they are.
+    Other lines, (n, 2), stay as they are. `heads_m` are the widths of their heads, and `spacings_m` the distances
+    between the axes of the two rails of a track.
     """
     near = near_lines(lines, points.xyz, heads_m, blunt=points.blunt)
     either = [_on_either_end(on_own_level(head)) for head in near]

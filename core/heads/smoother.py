@@ -85,17 +85,10 @@ begin abruptly, the design alone has to follow the rail."""
 
 @dataclass(frozen=True)
 class Spline:
-    """A smoothed course of values, and its errors.
+    """A smoothed course of values, with knots every `step_m` from `start_m`, and its errors.
 
-    Attributes
-    ----------
-    start_m, step_m : float
-        First knot, and distance between knots.
-    coefficients : (n,) array
-    likely : list
-        For each likely strength of the prior: its probability, the Cholesky factor of the information about both
-        splines, and by how much its coefficients differ from the mean.
-    prior : Prior
+    `likely` has, for each likely strength of the prior, its probability, the Cholesky factor of the information about
+    both splines, and by how much its coefficients differ from the mean.
     """
 
     start_m: float
@@ -147,20 +140,10 @@ def smooth(
     line: np.ndarray | None = None,
     prior: Prior = SHARP,
 ) -> Spline:
-    """Fit a spline to measurements.
+    """Fit a spline from `start_m` to `end_m` to measurements at chainages `t`, with the inverse of their variances.
 
-    Parameters
-    ----------
-    t, values : (n,) arrays
-        Chainage, metres, and measured value, at least one.
-    information : (n,) array
-        Inverse of the variance of each value.
-    start_m, end_m : float
-        Part of the line that the spline covers.
-    line : (k, 2) array, optional
-        Line in plan to whose left the values are measured: the design is that of the line and the values together.
-    prior : Prior
-        Expected about the design.
+    `line`, (k, 2), is a line in plan to whose left the values are measured: the design is that of the line and the
+    values together. `prior` is what is expected about the design.
     """
     pieces = max(int(np.ceil((end_m - start_m) / KNOT_M)), 1)
     step_m, count = max(end_m - start_m, 1e-3) / pieces, pieces + BAND - 1
@@ -188,16 +171,8 @@ def smooth(
 def bridge_error(t: np.ndarray, stations: np.ndarray, turn: float) -> np.ndarray:
     """Return how far a course may be off where nothing is measured, (s,) metres: there, a curve may begin unseen.
 
-    A third derivative that is wrong by k moves a course by k a b (a + b) / 12 at distances a and b from what is
-    measured, and by k a³ / 6 beyond the last of it.
-
-    Parameters
-    ----------
-    t : (n,) array
-        Chainages at which something is measured, increasing.
-    stations : (s,) array
-    turn : float
-        Third derivative, 1/m².
+    A third derivative that is wrong by k, up to `turn` (1/m²), moves a course by k a b (a + b) / 12 at distances a and
+    b from what is measured, at increasing chainages `t`, and by k a³ / 6 beyond the last of it.
     """
     after = np.searchsorted(t, stations)
     sides = np.array([stations - np.append(-np.inf, t)[after], np.append(t, np.inf)[after] - stations])
@@ -228,15 +203,8 @@ def _third_differences(line: np.ndarray, start_m: float, step_m: float, pieces: 
 class _Priors:
     """What is expected of the coefficients of design and waves, which take turns in one array, for `s` strengths.
 
-    Attributes
-    ----------
-    design, amplitude_m : (s,) arrays
-        See `Prior`.
-    step_m : float
-        Distance between the knots.
-    bends : (p,) array
-        Third differences that the line has without the spline.
-    prior : Prior
+    `step_m` is the distance between the knots, and `bends`, (p,), are third differences that the line has without the
+    spline.
     """
 
     design: np.ndarray
@@ -290,14 +258,9 @@ class _Priors:
 
 
 def _fits(data: np.ndarray, score: np.ndarray, priors: _Priors) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Find the most probable coefficients by reweighting, for all strengths at once.
+    """Find the most probable coefficients by reweighting, for all strengths at once, (s, n), and their evidence, (s,).
 
-    Returns
-    -------
-    coefficients : (s, n) array
-    factors : (8, s, 2 n) array
-        Cholesky factors of the information about both splines.
-    evidence : (s,) array
+    Between both, returns the Cholesky factors of the information about both splines, (8, s, 2 n).
     """
     count, strengths = len(score), len(priors.design)
     data_of_both = _of_both(data)[:, None]

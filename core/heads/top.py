@@ -54,14 +54,9 @@ LEAST_INFORMATION = 1e-6
 class Crown:
     """How the top of a head falls beside its axis: in proportion to the square of the distance, up to the rims.
 
-    Attributes
-    ----------
-    bend, sigma : float
-        Fall per square of the distance, and its standard error, 1/m.
-    rim_m : float
-        Distance from the axis up to which the top falls.
-    level_m : float
-        Standard error of the level of the top that more points would not reduce.
+    `bend` and `sigma` are the fall per square of the distance and its standard error, 1/m, and `rim_m` is the distance
+    from the axis up to which the top falls. `level_m` is the standard error of the level of the top that more points
+    would not reduce.
     """
 
     bend: float
@@ -107,18 +102,10 @@ Course = Union[Profile, Spline]
 
 @dataclass(frozen=True)
 class Top:
-    """The top of a head.
+    """The top of a head: its height on the axis, the points on it, and the rise per metre to the left at each of them.
 
-    Attributes
-    ----------
-    course : Profile or Spline
-        Its height on the axis.
-    points : HeadPoints
-        Points on it.
-    slope : (n,) array
-        Rise per metre to the left, at each of them.
-    crown_m : float or (s,) array
-        Standard error of the height on the axis that more points would not reduce, at all stations or at each.
+    `crown_m` is the standard error of the height on the axis that more points would not reduce, at all stations or at
+    each.
     """
 
     course: Course
@@ -182,18 +169,9 @@ def fit_crown(points: HeadPoints) -> Crown:
 
 
 def smoothed(t: np.ndarray, z: np.ndarray, smoothing_m: float | None, prior: Prior = SHARP) -> Course:
-    """Smooth the heights of points.
+    """Smooth heights of points at increasing chainages by PAEK or, with None, by a spline as much as points show.
 
     Points of a bin are averaged, so that no single point marks the edge of a gap.
-
-    Parameters
-    ----------
-    t, z : (n,) arrays
-        Chainage (increasing) and height, metres.
-    smoothing_m : float or None
-        Sigma of PAEK; None smooths by a spline as much as the points show.
-    prior : Prior
-        Expected about the design.
     """
     rough = rough_level(t, z)
     noise_m = robust_sigma(z - rough)
@@ -215,20 +193,7 @@ def find_top(
 
     The slope across is removed first. The disc then separates the top from the side faces, but it rests on the highest
     points, about three standard deviations above the top. Selecting the points in a band around their own smoothed
-    height, a few times over, removes that bias.
-
-    Parameters
-    ----------
-    points : HeadPoints
-        Points on the head.
-    crown_radius_m : float
-        Radius of the disc.
-    tolerance_m : float
-        Maximum depth of a point below the top.
-    smoothing_m : float or None
-        See `smoothed`.
-    prior : Prior
-        Expected about the design.
+    height, down to `tolerance_m`, a few times over, removes that bias.
     """
     t, z = points.t, points.z
     slope = cross_slope(t, points.across, z - rough_level(t, z), points.width_m)

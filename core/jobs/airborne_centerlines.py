@@ -10,7 +10,7 @@ from ..fields import AIRBORNE
 from ..parameters import AIRBORNE_CLASSES, AirborneParameters
 from ..progress import Estimating
 from ..standards import SEARCHED_CLASSES
-from . import outputs, shared
+from . import inputs, methods, outputs
 from .declaration import (
     CLOUD_NEEDS,
     CLOUD_WORDS,
@@ -27,7 +27,7 @@ from .declaration import (
 from .values import class_numbers
 
 if TYPE_CHECKING:
-    from ..airborne.survey import Survey
+    from ..airborne.survey import AirborneSurvey
     from ..progress import Progress
     from .result import Result
     from .values import Values
@@ -58,8 +58,7 @@ def _class_codes(values: Values) -> tuple[int, ...]:
 
 def _run(values: Values, progress: Progress) -> Result:
     """Fit the tracks along the guides."""
-    from ..airborne.files import survey_files
-    from ..airborne.reading import Run
+    from ..airborne.files import Run, survey_files
     from .result import ShownCloud
 
     progress, standard, codes = Estimating(progress), values.standard(), _class_codes(values)
@@ -72,7 +71,7 @@ def _run(values: Values, progress: Progress) -> Result:
     return replace(made, cloud=ShownCloud("INPUT", codes, standard.head_width_m))
 
 
-def _fitted(survey: Survey, values: Values) -> Result:
+def _fitted(survey: AirborneSurvey, values: Values) -> Result:
     """Return what was found along the guides as a result."""
     from ..files.layers import airborne_stations_layer, findings_layer, lines_layer
     from ..report.airborne import airborne_findings, airborne_page, airborne_summary
@@ -109,7 +108,7 @@ JOB = Job(
     (*RAIL_WORDS, *CLOUD_WORDS, *TRACK_WORDS, "airborne", "ALS", "national", "OpenStreetMap", "centerline"),
     CLOUD_NEEDS,
     (
-        replace(shared.CLOUD, label="Airborne point cloud (layer, file or folder)"),
+        replace(inputs.CLOUD, label="Airborne point cloud (layer, file or folder)"),
         Text(
             "CLASSES",
             "Classes",
@@ -119,12 +118,12 @@ JOB = Job(
             default=",".join(map(str, AIRBORNE_CLASSES)),
         ),
         replace(
-            shared.GUIDE,
+            inputs.GUIDE,
             help="One line for each track of the railway, such as railway=rail of OpenStreetMap, up to 3 m off. Give "
             "every track its guide: they are fitted together.",
             advanced=False,
         ),
-        *shared.RAIL,
+        *inputs.RAIL,
         Number(
             "REACH",
             "Reach [m]",
@@ -151,8 +150,8 @@ JOB = Job(
             default=AirborneParameters.rail_height_m,
             high=MAX_RAIL_M,
         ),
-        *shared.AREA,
-        shared.WORKERS,
+        *inputs.AREA,
+        methods.WORKERS,
     ),
     (
         replace(

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ..fields import CENTERLINES, RAILS
-from . import outputs, shared
+from . import inputs, methods, outputs
 from .declaration import LINE_NEEDS, RAIL_WORDS, STEPS, TRACK_WORDS, Job, LayerInput
 
 if TYPE_CHECKING:
@@ -56,13 +56,13 @@ JOB = Job(
     LINE_NEEDS,
     (
         LayerInput("INPUT", "Rails", "Lines of railheads, from Vectorize Rails or drawn by hand."),
-        *shared.RAIL,
-        *shared.PAIRING,
-        shared.MAX_GAP,
-        shared.SMOOTHING_XY,
-        shared.SIMPLIFY_XY,
-        shared.SIMPLIFY_Z,
-        shared.MIN_LENGTH,
+        *inputs.RAIL,
+        *methods.PAIRING,
+        methods.MAX_GAP,
+        methods.SMOOTHING_XY,
+        methods.SIMPLIFY_XY,
+        methods.SIMPLIFY_Z,
+        methods.MIN_LENGTH,
     ),
     (
         replace(outputs.CENTERLINES_OUTPUT, name="OUTPUT", optional=False),

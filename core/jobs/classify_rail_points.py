@@ -8,12 +8,12 @@ from ..errors import ParameterError
 from ..parameters import DEFAULT_GUIDE_DISTANCE_M, Parameters
 from ..progress import Estimating
 from ..standards import SEARCHED_CLASSES
-from . import outputs, shared
+from . import inputs, methods, outputs
 from .declaration import CLOUD_NEEDS, CLOUD_WORDS, RAIL_WORDS, RAW_CLOUDS, Flag, Job, Number
 
 if TYPE_CHECKING:
     from ..clouds.points import Request
-    from ..labelling.files import Result as Found
+    from ..labelling.files import ClassifiedFiles
     from ..progress import Progress
     from .result import Result
     from .values import Values
@@ -36,12 +36,12 @@ def _run(values: Values, progress: Progress) -> Result:
     """Classify the cloud and write the copy."""
     from ..checks.standard import warn_of_raw
     from ..classify.settings import Settings
-    from ..labelling.files import Choice, classify_files, plan_output
+    from ..labelling.files import Content, classify_files, plan_output
     from ..labelling.finding import guide_of
 
     progress, standard = Estimating(progress), values.standard()
     gauges_m = (standard.gauge_m, *(gauge_m for gauge_m, _ in values.other_gauges(standard)))
-    choice = Choice(values["RAIL_CLASS"], values.rails_only(), values["RESET"])
+    choice = Content(values["RAIL_CLASS"], values.rails_only(), values["RESET"])
     output = plan_output(values.cloud().paths, values.path("OUTPUT"), choice.class_code, progress)
     request, guide = values.request(SEARCHED_CLASSES, progress), None
     if values.filled("GUIDE"):
@@ -55,7 +55,7 @@ def _run(values: Values, progress: Progress) -> Result:
     return classified(found, request)
 
 
-def classified(found: Found, request: Request) -> Result:
+def classified(found: ClassifiedFiles, request: Request) -> Result:
     """Return the result of a job that writes a classified copy."""
     from .result import Result
 
@@ -86,11 +86,11 @@ JOB = Job(
     (*RAIL_WORDS, *CLOUD_WORDS, "classification", "raw", "segmentation", "Klassifizierung"),
     CLOUD_NEEDS,
     (
-        shared.RAW_CLOUD,
-        *shared.RAIL,
-        shared.OTHER_GAUGES,
-        *shared.AREA,
-        shared.GUIDE,
+        inputs.RAW_CLOUD,
+        *inputs.RAIL,
+        methods.OTHER_GAUGES,
+        *inputs.AREA,
+        inputs.GUIDE,
         Number(
             "GUIDE_DISTANCE",
             "Distance from the guide [m]",
@@ -98,7 +98,7 @@ JOB = Job(
             advanced=True,
             default=DEFAULT_GUIDE_DISTANCE_M,
             low=0.5,
-            high=shared.MAX_LENGTH_M,
+            high=methods.MAX_LENGTH_M,
         ),
         Flag(
             "ONLY_GUIDED",
@@ -107,7 +107,7 @@ JOB = Job(
             advanced=True,
             default=False,
         ),
-        *shared.METHOD,
+        *methods.METHOD,
         Flag(
             "KEEP_SINGLE",
             "Keep rails without a partner",
@@ -115,7 +115,7 @@ JOB = Job(
             "example because it is hidden. Otherwise only pairs of rails are kept.",
             default=True,
         ),
-        *shared.CONTENT,
+        *methods.CONTENT,
         Flag(
             "RESET",
             "Reset the class of other points",
@@ -124,7 +124,7 @@ JOB = Job(
             advanced=True,
             default=True,
         ),
-        shared.WORKERS,
+        methods.WORKERS,
     ),
     outputs.CLASSIFIED,
     outputs.CLASSIFIED_FIGURES,

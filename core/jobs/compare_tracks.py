@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import ParameterError
 from ..fields import DIFFERENCE_FIELDS
 from ..parameters import ComparisonParameters
-from . import outputs, shared
+from . import methods, outputs
 from .declaration import (
     ALIGNMENT,
     LINE_NEEDS,
@@ -96,7 +96,7 @@ def _run(values: Values, progress: Progress) -> Result:
 def _survey(values: Values, name: str, frame: LocalFrame | None, progress: Progress) -> tuple[Survey, LocalFrame]:
     """Read one survey in a frame; without one, in its own, which is returned as well."""
     from ..comparison.tracks import Survey
-    from .reading import way
+    from .lines import way
 
     rails, sigma = SURVEYS[name]
     lines = values.lines(name, progress)
@@ -187,7 +187,7 @@ JOB = Job(
             advanced=True,
             default=ComparisonParameters.step_m,
             low=0.1,
-            high=shared.MAX_LENGTH_M,
+            high=methods.MAX_LENGTH_M,
         ),
     ),
     (

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from .. import VERSION
-from . import outputs, shared
+from . import inputs, outputs
 from .declaration import (
     ALIGNMENT,
     ALIGNMENT_WORDS,
@@ -42,7 +42,7 @@ def _check(values: Values) -> None:
 def _run(values: Values, progress: Progress) -> Result:
     """Read the table, check it and write the file."""
     from ..files.design_files import check_designs, left_out, write_designs
-    from .reading import read_elements
+    from .lines import read_elements
     from .result import Result
 
     alignments = read_elements(values, "INPUT", values["CRS"], progress.span(0, READING))
@@ -77,11 +77,11 @@ JOB = Job(
             kinds=(TABLE,),
         ),
         replace(
-            shared.CRS,
+            inputs.CRS,
             label="CRS of a table without one",
             help="Projected coordinate system in metres for a table without geometries; other tables keep their own.",
         ),
-        *shared.RAIL,
+        *inputs.RAIL,
         Choice(
             "VERTICAL_CURVES",
             "Curves of the profile in LandXML",

@@ -10,7 +10,7 @@ from ..frpdf.models import choose as choose_model
 from ..parameters import LEARNED, STRIPS, Parameters
 from ..progress import Estimating
 from ..standards import DEFAULT, SEARCHED_CLASSES
-from . import outputs, shared
+from . import inputs, methods, outputs
 from .declaration import CLOUD_NEEDS, CLOUD_WORDS, RAIL_WORDS, TRACK_WORDS, Choice, Flag, Job, RasterOutput
 
 if TYPE_CHECKING:
@@ -139,7 +139,7 @@ def _result(values: Values, network: RailNetwork, origin: Origin) -> Result:
 
 def _cleaned(values: Values, network: RailNetwork, standard: RailStandard) -> Rasters | None:
     """Return the network's output as Clean Rail Raster writes it; None if no rail cell is left."""
-    from ..files.raster_file import header_for, on_one_grid
+    from ..files.rail_rasters import header_for, on_one_grid
 
     if not any(raster.tiles for raster in network.cleaned):
         return None
@@ -161,8 +161,8 @@ JOB = Job(
     (*RAIL_WORDS, *CLOUD_WORDS, *TRACK_WORDS, "centerline", "centreline", "axis", "vectorize", "line", "3d"),
     (*CLOUD_NEEDS, ("cv2", "torch")),
     (
-        shared.CLOUD,
-        shared.RAIL_CLASSES,
+        inputs.CLOUD,
+        inputs.RAIL_CLASSES,
         Flag(
             "MERGE_CLASSES",
             "Take all rail classes for one",
@@ -177,22 +177,22 @@ JOB = Job(
             "rail classes are ignored.",
             default=False,
         ),
-        *shared.METHOD,
+        *methods.METHOD,
         replace(
-            shared.SEEDS,
+            inputs.SEEDS,
             label="Seeds in a raw cloud",
             help="Points on railheads, or lines along them: only the rails that grow from these are extracted, as Grow "
             "Rail Points from Seeds follows them. The rail classes are ignored.",
             advanced=True,
         ),
-        shared.DETECTED_STANDARD,
-        shared.GAUGE,
-        shared.HEAD_WIDTH,
-        *shared.AREA,
-        replace(shared.MODEL, advanced=True),
-        *shared.CLEANUP,
-        *shared.LINES,
-        *shared.PAIRING,
+        inputs.DETECTED_STANDARD,
+        inputs.GAUGE,
+        inputs.HEAD_WIDTH,
+        *inputs.AREA,
+        replace(methods.MODEL, advanced=True),
+        *methods.CLEANUP,
+        *methods.LINES,
+        *methods.PAIRING,
         Choice(
             "STRIPS",
             "Strips of the scanner",
@@ -203,9 +203,9 @@ JOB = Job(
             options=STRIPS,
             default=Parameters.strips,
         ),
-        shared.STEP,
-        shared.WORKERS,
-        *shared.axis(optional=True),
+        methods.STEP,
+        methods.WORKERS,
+        *inputs.axis(optional=True),
     ),
     (
         outputs.RAILS_OUTPUT,

@@ -1,6 +1,6 @@
-"""What jobs read from vector layers, checked in one place: lines, guides, seeds, masks, axes and tables.
+"""What jobs read from vector layers, checked in one place: lines, guides, seeds, masks, axes, tables, and places.
 
-QGIS reads layers itself, the command line and Python with pyogrio and shapely; both provide a `Source`.
+QGIS reads layers itself, the command line and Python with pyogrio and shapely; both provide a `FeatureSource`.
 """
 
 from __future__ import annotations
@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..airborne.survey import Guide, gauge_of
+from ..airborne.survey import GuideLine, gauge_of
 from ..clouds.crs import parse_crs, title_of, unit_in_plan
 from ..clouds.mask import Mask
-from ..design_places import check_line, check_places
+from ..design_numbers import check_line, check_places
 from ..errors import CrsError, MissingError, ParameterError, RailExtractError
 from ..kilometres.axes import (
     AHEAD,
@@ -23,9 +23,9 @@ from ..kilometres.axes import (
     NAME_FIELDS,
     Axes,
     AxisLine,
+    AxisStart,
     PlacedAxes,
     Post,
-    Start,
     check_jumps,
     km_of,
     make_axes,
@@ -34,11 +34,17 @@ from ..kilometres.axes import (
 from ..kilometres.stationing import Jump
 from ..progress import Progress
 from .declaration import LINE, POINT, POLYGON
-from .lines import Lines, Row, system_of, without_steps
-from .shared import DECREASING
+from .inputs import DECREASING
+from .lines import LayerLines, Row, system_of, without_steps
 
 if TYPE_CHECKING:
     from .values import Rows, Values
+
+
+from ..design_numbers import are_places
+
+FAR, NOWHERE = np.full(2, np.inf), np.full(2, np.nan)
+"""Places of a feature that is not on any map, and of one without a geometry."""
 
 
 @dataclass(frozen=True)
@@ -72,19 +78,12 @@ class Feature:
         return (vertices for one, vertices in self.parts if one == kind)
 
 
-class Source(ABC):
+class FeatureSource(ABC):
     """A vector layer or a table.
 
-    Attributes
-    ----------
-    name : str
-        Of the parameter that was given it, for messages.
-    count : int
-        Number of features.
-    kinds : collection of str
-        Kinds of the geometries that it may have; none for a table.
-    notices : sequence of str
-        What the user is told of the fields where the features are copied.
+    `name` is the parameter that was given it, for messages; `count` the number of features; `kinds` those of the
+    geometries that it may have, none for a table. `notices` are what the user is told of the fields where the features
+    are copied.
     """
 
     name: str
@@ -111,13 +110,10 @@ class Source(ABC):
         return f"{self.name} (feature {number})"
 
 
-def read_lines(source: Source, progress: Progress) -> Lines:
+def read_lines(source: FeatureSource, progress: Progress) -> LayerLines:
     """Read all parts of all lines that have a length, in one local frame.
 
-    Raises
-    ------
-    RailExtractError
-        The lines are in degrees, there is none, or one has an impossible vertex.
+    Raises RailExtractError if the lines are in degrees, there is none, or one has an impossible vertex.
     """
     system = system_of(source.crs_wkt, progress)
     parts = (
@@ -126,10 +122,10 @@ def read_lines(source: Source, progress: Progress) -> Lines:
         for moving in map(_moving, feature.of_kind(LINE))
         if len(moving) > 1
     )
-    return Lines.of(source.name, parts, source.fields, system, progress)
+    return LayerLines.of(source.name, parts, source.fields, system, progress)
 
 
-def read_lines_in(source: Source, crs_wkt: str | None, progress: Progress) -> Lines:
+def read_lines_in(source: FeatureSource, crs_wkt: str | None, progress: Progress) -> LayerLines:
     """Read the same lines in another coordinate system; errors as for `read_lines`, or they can't be transformed."""
     parts = (
         (feature.number, feature.row, moving)
@@ -137,21 +133,18 @@ def read_lines_in(source: Source, crs_wkt: str | None, progress: Progress) -> Li
         for moving in map(_moving, feature.of_kind(LINE))
         if len(moving) > 1
     )
-    return Lines.of(source.name, parts, source.fields, system_of(crs_wkt or source.crs_wkt, progress), progress)
+    return LayerLines.of(source.name, parts, source.fields, system_of(crs_wkt or source.crs_wkt, progress), progress)
 
 
-def read_rows(source: Source, progress: Progress) -> Rows:
+def read_rows(source: FeatureSource, progress: Progress) -> Rows:
     """Read the values of all features, and the names of their fields."""
     return [row for _, row in progress.follow(source.rows(), source.count)], source.fields
 
 
-def read_lines_along(source: Source, crs_wkt: str | None) -> list[np.ndarray]:
+def read_lines_along(source: FeatureSource, crs_wkt: str | None) -> list[np.ndarray]:
     """Read lines that show places along tracks, (k, 2) each, in a coordinate system.
 
-    Raises
-    ------
-    RailExtractError
-        There is none, one leads to a place that is not on the map, or they can't be transformed.
+    Raises RailExtractError if there is none, one leads to a place that is not on the map, or they can't be transformed.
     """
     lines = [line for _, line in _lines_along(source, _placed(source, crs_wkt), crs_wkt)]
     if not lines:
@@ -159,13 +152,13 @@ def read_lines_along(source: Source, crs_wkt: str | None) -> list[np.ndarray]:
     return lines
 
 
-def read_guides(source: Source, crs_wkt: str | None) -> list[Guide]:
+def read_guides(source: FeatureSource, crs_wkt: str | None) -> list[GuideLine]:
     """Read such lines with the name, reference and gauge of the track along each; see `read_lines_along`."""
     features = _placed(source, crs_wkt)
     if any(kind == POLYGON for feature in features for kind, _ in feature.parts):
         raise ParameterError(f"{source.name} has polygons: give lines along the tracks, one for each.")
     guides = [
-        Guide(
+        GuideLine(
             feature.number,
             line,
             gauge_of(feature.row.get("gauge")),
@@ -178,7 +171,7 @@ def read_guides(source: Source, crs_wkt: str | None) -> list[Guide]:
     return guides
 
 
-def read_seeds(source: Source, crs_wkt: str | None) -> list[np.ndarray]:
+def read_seeds(source: FeatureSource, crs_wkt: str | None) -> list[np.ndarray]:
     """Read points, (1, 2) each, and lines, (k, 2) each; see `read_lines_along`."""
     features = _placed(source, crs_wkt)
     points = [vertices[:, :2] for feature in features for vertices in feature.of_kind(POINT)]
@@ -190,13 +183,10 @@ def read_seeds(source: Source, crs_wkt: str | None) -> list[np.ndarray]:
     return found
 
 
-def read_mask(source: Source, crs_wkt: str | None) -> Mask:
+def read_mask(source: FeatureSource, crs_wkt: str | None) -> Mask:
     """Read the polygons of a mask, of which overlaps count once.
 
-    Raises
-    ------
-    RailExtractError
-        There is none, one is not on the map, or they can't be transformed.
+    Raises RailExtractError if there is none, one is not on the map, or they can't be transformed.
     """
     _placed(source, crs_wkt)
     rings = source.rings(crs_wkt)
@@ -206,17 +196,10 @@ def read_mask(source: Source, crs_wkt: str | None) -> Mask:
 
 
 def read_axes(values: Values, crs_wkt: str | None) -> PlacedAxes:
-    """Read AXIS and what states its kilometres, in a coordinate system.
+    """Read AXIS and what states its kilometres, in a projected coordinate system, or None for metres as they are.
 
-    Parameters
-    ----------
-    crs_wkt : str or None
-        Projected, or None for coordinates in metres that nothing transforms.
-
-    Raises
-    ------
-    RailExtractError
-        A layer can't be transformed or lacks what it should state, or they contradict each other.
+    Raises RailExtractError if a layer can't be transformed or lacks what it should state, or they contradict each
+    other.
     """
     axis, unit_m = values.source("AXIS"), unit_in_plan(crs_wkt)
     lines = list(_axis_lines(axis, crs_wkt, unit_m))
@@ -224,7 +207,7 @@ def read_axes(values: Values, crs_wkt: str | None) -> PlacedAxes:
         raise MissingError(axis.name, "line")
     start = None
     if values.filled("START_KM"):
-        start = Start(values["START_KM"], values["DIRECTION"] == DECREASING)
+        start = AxisStart(values["START_KM"], values["DIRECTION"] == DECREASING)
     posts = _posts(values.source("POSTS"), values["POST_FIELD"], crs_wkt) if values.filled("POSTS") else []
     jumps = _jumps(values.source("JUMPS")) if values.filled("JUMPS") else []
     made = make_axes(lines, start, posts, jumps)
@@ -234,7 +217,7 @@ def read_axes(values: Values, crs_wkt: str | None) -> PlacedAxes:
     return PlacedAxes(made, unit_m, values["FORMAT"])
 
 
-def _placed(source: Source, crs_wkt: str | None) -> list[Feature]:
+def _placed(source: FeatureSource, crs_wkt: str | None) -> list[Feature]:
     """Return the features in another coordinate system, all of which are on the map."""
     features, unit_m = list(source.features(crs_wkt)), unit_in_plan(source.crs_wkt)
     for feature in features:
@@ -248,7 +231,7 @@ def _placed(source: Source, crs_wkt: str | None) -> list[Feature]:
 
 
 def _lines_along(
-    source: Source, features: Sequence[Feature], crs_wkt: str | None
+    source: FeatureSource, features: Sequence[Feature], crs_wkt: str | None
 ) -> Iterator[tuple[Feature, np.ndarray]]:
     """Yield the lines, (k, 2), without stray vertices."""
     unit_m = unit_in_plan(crs_wkt or source.crs_wkt)
@@ -263,7 +246,7 @@ def _moving(vertices: np.ndarray) -> np.ndarray:
     return without_steps(vertices[:, :3].copy())
 
 
-def _measured_features(source: Source, crs_wkt: str | None) -> Iterator[Feature]:
+def _measured_features(source: FeatureSource, crs_wkt: str | None) -> Iterator[Feature]:
     """Yield the features of a layer in the plane in which kilometres are measured."""
     for feature in source.features(crs_wkt):
         if feature.is_lost:
@@ -274,7 +257,7 @@ def _measured_features(source: Source, crs_wkt: str | None) -> Iterator[Feature]
         yield feature
 
 
-def _axis_lines(source: Source, crs_wkt: str | None, unit_m: float) -> Iterator[AxisLine]:
+def _axis_lines(source: FeatureSource, crs_wkt: str | None, unit_m: float) -> Iterator[AxisLine]:
     """Yield the parts of all lines that have a length."""
     named = next((name for name in NAME_FIELDS if name in source.fields), None)
     for feature in _measured_features(source, crs_wkt):
@@ -284,7 +267,7 @@ def _axis_lines(source: Source, crs_wkt: str | None, unit_m: float) -> Iterator[
                 yield AxisLine(str(name), vertices[:, :2] * unit_m, vertices[:, 3])
 
 
-def _posts(source: Source, field: str | None, crs_wkt: str | None) -> list[Post]:
+def _posts(source: FeatureSource, field: str | None, crs_wkt: str | None) -> list[Post]:
     """Read the posts."""
     name = field or post_field(source.fields)
     if name not in source.fields:
@@ -300,7 +283,48 @@ def _posts(source: Source, field: str | None, crs_wkt: str | None) -> list[Post]
     return found
 
 
-def _jumps(source: Source) -> list[Jump]:
+def _jumps(source: FeatureSource) -> list[Jump]:
     """Read the table of jumps."""
     check_jumps(source.fields)
     return [Jump(*(km_of(row[name], name, "JUMPS", number) for name in (BACK, AHEAD))) for number, row in source.rows()]
+
+
+@dataclass(frozen=True)
+class PlacedFeatures:
+    """Features of a layer in the plane of an axis.
+
+    `xy`, (n, 2), is where each counts: half way along a line, inside a polygon, in the mean of points; else `FAR` or
+    `NOWHERE`. `vertices`, (m, 2), are those of all features, of a polygon those of its outer ring, and `owner`, (m,),
+    the number of the feature of each. `originals` is for a `Copy` with further fields.
+    """
+
+    ids: Sequence[int]
+    xy: np.ndarray
+    vertices: np.ndarray
+    owner: np.ndarray
+    are_points: bool
+    originals: FeatureSource
+
+
+def places_of(source: FeatureSource, plane: str | None, progress: Progress) -> PlacedFeatures:
+    """Read where the features of a layer count in the plane of axes."""
+    for notice in source.notices:
+        progress.warning(notice)
+    features, unit_m = list(progress.follow(source.features(plane), source.count)), unit_in_plan(plane)
+    shapes = [np.concatenate([np.empty((0, 4)), *(part for _, part in one.parts)])[:, :2] for one in features]
+    xy = [_place(feature, shape, unit_m) for feature, shape in zip(features, shapes)]
+    return PlacedFeatures(
+        [feature.number for feature in features],
+        np.reshape(xy, (-1, 2)),
+        np.concatenate([np.empty((0, 2)), *shapes]),
+        np.repeat(np.arange(len(shapes)), list(map(len, shapes))),
+        source.kinds == {POINT},
+        source,
+    )
+
+
+def _place(feature: Feature, shape: np.ndarray, unit_m: float) -> np.ndarray:
+    """Return where a feature with these vertices, (n, 2), counts."""
+    if feature.is_lost or not are_places(shape, unit_m).all():
+        return FAR
+    return feature.middle() if len(shape) else NOWHERE

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from ..parameters import TRANSITIONS, FitParameters
-from . import outputs, shared
+from . import inputs, methods, outputs
 from .declaration import (
     ALIGNMENT,
     LINE_NEEDS,
@@ -25,8 +25,8 @@ from .declaration import (
 )
 
 if TYPE_CHECKING:
-    from ..alignment.deviations import Deviations
     from ..alignment.fit import Fit
+    from ..alignment.measured import Deviations
     from ..progress import Progress
     from .result import Result
     from .values import Values
@@ -52,7 +52,7 @@ def _run(values: Values, progress: Progress) -> Result:
     from ..files.layers import elements_layer, stations_layer
     from ..progress import Recording
     from ..report import build_alignment_page
-    from .reading import read_elements, read_tracks
+    from .lines import read_elements, read_tracks
     from .result import Result
 
     progress = Recording(progress)
@@ -127,7 +127,7 @@ JOB = Job(
             optional=True,
             kinds=(POINT,),
         ),
-        shared.RAILS_OF_CANT,
+        inputs.RAILS_OF_CANT,
         Number(
             "TOLERANCE",
             "Tolerance [mm]",
@@ -135,7 +135,7 @@ JOB = Job(
             "design by its length; more is followed by elements.",
             default=1000.0 * FitParameters.tolerance_m,
             low=MIN_FIT_TOLERANCE_MM,
-            high=1000.0 * shared.MAX_TOLERANCE_M,
+            high=1000.0 * methods.MAX_TOLERANCE_M,
             decimals=MM_DECIMALS,
         ),
         Number(

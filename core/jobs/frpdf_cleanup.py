@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 
 from ..errors import RasterError
 from ..frpdf.models import MODELS, Model, choose
-from . import outputs, shared
+from . import inputs, methods, outputs
 from .declaration import RAIL_WORDS, STEPS, Job, RasterOutput
 
 if TYPE_CHECKING:
-    from ..files.raster_file import RasterHeader
+    from ..files.rail_rasters import RasterHeader
     from ..progress import Progress
     from ..standards import RailStandard
     from .result import Result
@@ -42,12 +42,7 @@ def _planned(values: Values) -> tuple[RasterHeader, Model]:
 def model_for(header: RasterHeader, standard: RailStandard, name: str) -> Model:
     """Return the model that the user named, or that a raster names, or that fits its rails; check the cell size.
 
-    Raises
-    ------
-    ModelError
-        No model fits.
-    RasterError
-        The cells do not have the size that the network expects for these rails.
+    Raises ModelError if no model fits, and RasterError if the network expects another cell size for these rails.
     """
     from ..raster import cell_size
 
@@ -66,8 +61,8 @@ def model_for(header: RasterHeader, standard: RailStandard, name: str) -> Model:
 def _run(values: Values, progress: Progress) -> Result:
     """Clean each band."""
     from ..frpdf.cleanup import clean
-    from ..frpdf.engines import make_engine
-    from ..frpdf.weights import load_arrays
+    from ..frpdf.engine import make_engine
+    from ..frpdf.models import load_arrays
     from .result import Result
 
     header, model = _planned(values)
@@ -91,7 +86,7 @@ JOB = Job(
     "A raster from other software does not state its gauge and railhead width: fill them in.",
     (*RAIL_WORDS, "raster", "neural network", "deep learning", "clean", "repair", "gaps", "noise"),
     (("numpy",), ("pyproj",), ("cv2", "torch")),
-    (shared.RASTER, shared.MODEL, *shared.CLEANUP, *shared.RASTER_RAIL),
+    (inputs.RASTER, methods.MODEL, *methods.CLEANUP, *inputs.RASTER_RAIL),
     (RasterOutput("OUTPUT", "Cleaned rail raster", "A GeoTIFF; the input of Vectorize Rails."),),
     (outputs.ENGINE_USED,),
     STEPS,

@@ -9,7 +9,7 @@ from ..errors import ParameterError
 from ..parameters import GrowParameters
 from ..progress import Estimating
 from ..standards import SEARCHED_CLASSES
-from . import outputs, shared
+from . import inputs, methods, outputs
 from .classify_rail_points import classified
 from .declaration import (
     CLOUD_NEEDS,
@@ -75,7 +75,7 @@ _GROWTH: tuple[Parameter, ...] = (
         high=0.4,
     ),
     replace(
-        shared.TOLERANCE_Z,
+        methods.TOLERANCE_Z,
         help="Largest difference in height between points of a head, and from one window to the next.",
         default=GrowParameters.tolerance_z_m,
     ),
@@ -95,7 +95,7 @@ _GROWTH: tuple[Parameter, ...] = (
         advanced=True,
         default=GrowParameters.max_length_m,
         low=1.0,
-        high=shared.MAX_LENGTH_M,
+        high=methods.MAX_LENGTH_M,
     ),
 )
 
@@ -114,13 +114,13 @@ def _check(values: Values) -> None:
 def _run(values: Values, progress: Progress) -> Result:
     """Follow the rails and write the copy."""
     from ..files.layers import stops_layer
-    from ..grow.settings import GrowSettings
-    from ..labelling.files import Choice, plan_output
+    from ..grow.heads import GrowSettings
+    from ..labelling.files import Content, plan_output
     from ..labelling.growing import grow_files
     from ..run.loop import Runner
 
     progress, standard = Estimating(progress), values.standard()
-    choice = Choice(values["RAIL_CLASS"], values.rails_only(), reset=False)
+    choice = Content(values["RAIL_CLASS"], values.rails_only(), reset=False)
     output = plan_output(values.cloud().paths, values.path("OUTPUT"), choice.class_code, progress)
     request = values.request(SEARCHED_CLASSES, progress)
     settings = GrowSettings(standard.gauge_m, standard.head_width_m, values.growth())
@@ -144,19 +144,19 @@ JOB = Job(
     (*RAIL_WORDS, *CLOUD_WORDS, "classification", "raw", "seed", "interactive", "follow", "Klassifizierung"),
     CLOUD_NEEDS,
     (
-        shared.RAW_CLOUD,
-        shared.SEEDS,
+        inputs.RAW_CLOUD,
+        inputs.SEEDS,
         Place(
             "SEED",
             "Seed on the map",
             "A single place on a railhead, picked on the map, besides the layer or instead of it.",
             optional=True,
         ),
-        *shared.RAIL,
+        *inputs.RAIL,
         *_GROWTH,
-        shared.CRS,
-        shared.LEFT_OUT,
-        *shared.CONTENT,
+        inputs.CRS,
+        inputs.LEFT_OUT,
+        *methods.CONTENT,
     ),
     (
         *outputs.CLASSIFIED,

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ..errors import CrsError, ParameterError
-from . import outputs, shared
+from . import inputs, outputs
 from .declaration import (
     ALIGNMENT,
     ALIGNMENT_WORDS,
@@ -22,8 +22,8 @@ from .declaration import (
 )
 
 if TYPE_CHECKING:
-    from ..alignment.deviations import Deviations
     from ..alignment.elements import Alignment
+    from ..alignment.measured import Deviations
     from ..progress import Progress
     from .result import Result
     from .values import Values
@@ -95,8 +95,9 @@ def _compared(
     values: Values, alignments: Sequence[Alignment], progress: Progress
 ) -> list[tuple[Alignment, Deviations]]:
     """Return the deviations of each track with the alignment beside it; none without tracks."""
-    from ..alignment.deviations import compared_with
-    from .reading import check_same_plane, read_tracks
+    from ..alignment.measured import compared_with
+    from .clouds import check_same_plane
+    from .lines import read_tracks
 
     if not values.filled("TRACKS"):
         return []
@@ -126,7 +127,7 @@ JOB = Job(
             kinds="LandXML files (*.xml *.landxml);;All files (*)",
         ),
         replace(
-            shared.CRS,
+            inputs.CRS,
             label="CRS of a file without one",
             help="Projected coordinate system in metres for a file that does not state one; other files keep their "
             "own.",
@@ -154,7 +155,7 @@ JOB = Job(
             optional=True,
             kinds=(POINT,),
         ),
-        shared.RAILS_OF_CANT,
+        inputs.RAILS_OF_CANT,
     ),
     (
         outputs.ELEMENTS_OUTPUT,

@@ -1,4 +1,4 @@
-"""The lines of vector layers, those of Rail Extract or drawn by hand, which QGIS or the files of a command read."""
+"""The lines of vector layers, those of Rail Extract or drawn by hand, tracks with their cant, and design elements."""
 
 from __future__ import annotations
 
@@ -11,16 +11,21 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from ..alignment.elements import Alignment
+from ..alignment.measured import Track, cant_of_rails, stations_by_track, with_cant
 from ..clouds.crs import MAX_COORDINATE, is_geographic, name_of, parse_crs, units, warn_of_scale
 from ..comparison.tracks import SurveyedLine
-from ..design_places import has_stray
+from ..design_numbers import has_stray
 from ..errors import CrsError, MissingError, RailExtractError
 from ..fields import CENTERLINE_FIELDS, RAIL_FIELDS, Field
+from ..files.table import alignments, check_table, frame_of, read_table
 from ..frame import ORIGIN_STEP, LocalFrame
 from ..polyline import Polyline, project
-from ..progress import Progress
+from ..progress import SILENT, Progress
 from ..rails import NO_GAPS, SAME_SUM_M, Centerline, RailLine
 from ..standards import GAUGE_RANGE_MM, HEAD_WIDTH_RANGE_MM
+from .clouds import check_same_plane
+from .values import Values
 
 Row = Mapping[str, Any]
 Made = TypeVar("Made")
@@ -33,15 +38,10 @@ MAX_WHOLE, ID = 2**31 - 1, re.compile(r"\s*\d{1,10}\s*")
 
 
 @dataclass(frozen=True)
-class Lines:
+class LayerLines:
     """The parts of all lines of a layer, each a line of its own.
 
-    Attributes
-    ----------
-    parts : list of (int, mapping, (n, 3) array)
-        Feature, its values by the name of the field, and vertices, local metres; z is NaN without heights.
-    fields : collection of str
-        Names of all fields.
+    A part is its feature, the values by field, and the vertices, (n, 3) local metres; z is NaN without heights.
     """
 
     parts: list[tuple[int, Row, np.ndarray]]
@@ -56,22 +56,11 @@ class Lines:
         fields: Collection[str],
         system: tuple[str | None, float, float],
         progress: Progress,
-    ) -> Lines:
-        """Check the lines of a layer, and put them into a local frame.
+    ) -> LayerLines:
+        """Check the lines of a layer, and put them into a local frame; `system` is that of `system_of`.
 
-        Parameters
-        ----------
-        name : str
-            Of the layer's parameter, for messages.
-        parts : iterable of (int, mapping, (n, 3) array)
-            With vertices in the coordinate system.
-        system : (str or None, float, float)
-            From `system_of`.
-
-        Raises
-        ------
-        RailExtractError
-            There is no line, or one with an impossible vertex.
+        `name` is that of the layer's parameter, for messages. Raises RailExtractError if there is no line, or one with
+        an impossible vertex.
         """
         crs_wkt, horizontal_unit_m, vertical_unit_m = system
         found = list(parts)
@@ -171,13 +160,7 @@ class Lines:
 
 
 def system_of(crs_wkt: str | None, progress: Progress) -> tuple[str | None, float, float]:
-    """Return a coordinate system with its units in plan and in height, metres.
-
-    Raises
-    ------
-    CrsError
-        It is in degrees.
-    """
+    """Return a coordinate system with its units in plan and in height, metres; raise CrsError if it is in degrees."""
     if not crs_wkt:
         progress.warning("The lines have no coordinate system: their coordinates are taken as metres.")
         return None, 1.0, 1.0
@@ -247,3 +230,40 @@ def gaps_in(row: Row, xyz: np.ndarray) -> np.ndarray:
     rise = np.diff(gaps.ravel()) if gaps.ndim == 2 and gaps.shape[1] == 2 else np.array([-1.0])
     in_order = bool((rise >= 0).all()) and gaps[-1, 1] <= Polyline(xyz).length_m + SAME_SUM_M
     return gaps if in_order else NO_GAPS.copy()
+
+
+def way(name: str, own: LocalFrame, other_name: str, frame: LocalFrame) -> np.ndarray:
+    """Return the vector, (3,) metres, from the frame of an input to that of another; see `check_same_plane`."""
+    check_same_plane(name, own.crs_wkt, other_name, frame)
+    check_same_plane(other_name, frame.crs_wkt, name, own)
+    return own.shift_to(frame)
+
+
+def read_tracks(values: Values, name: str, progress: Progress) -> tuple[list[Track], LocalFrame]:
+    """Read centerlines with their cant: from QUALITY, else from RAILS.
+
+    Raises RailExtractError if a layer has no lines, lacks a field, or states the cant of other tracks.
+    """
+    read = values.lines(name, progress)
+    lines, frame = [(line.track_id, line.xyz) for line in read.centerlines()], read.frame
+    if values.filled("QUALITY"):
+        return with_cant(lines, stations_by_track(*values.rows("QUALITY", SILENT), "QUALITY"), "QUALITY", name), frame
+    shapes = []
+    if values.filled("RAILS"):
+        rails = values.lines("RAILS", progress)
+        shift = way("RAILS", rails.frame, name, frame)
+        shapes = [xyz + shift for _, _, xyz in rails.parts]
+    none = [np.zeros(len(xyz), dtype=bool) for _, xyz in lines]
+    return [Track(one, xyz, cant_of_rails(xyz, shapes), own) for (one, xyz), own in zip(lines, none)], frame
+
+
+def read_elements(values: Values, name: str, crs_wkt: str | None, progress: Progress = SILENT) -> list[Alignment]:
+    """Read the alignments of an element table; its geometries are not used.
+
+    `crs_wkt` is the coordinate system of a table that has none. Raises RailExtractError if the table is in degrees or
+    not an element table, or an element is wrong.
+    """
+    table, fields = values.rows(name, progress)
+    check_table(fields, name)
+    rows = read_table(table, name)
+    return alignments(rows, frame_of(rows, system_of(values.system(name) or crs_wkt, progress), name), progress)

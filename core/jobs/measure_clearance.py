@@ -9,7 +9,7 @@ from ..clearance.profiles import COLUMNS, CUSTOM, NO_RULE, Profile, custom, name
 from ..errors import CrsError, ParameterError, RailExtractError
 from ..fields import INTRUSION_FIELDS, LENGTH
 from ..progress import Recording
-from . import outputs, shared
+from . import inputs, methods, outputs
 from .declaration import (
     CLOUD_NEEDS,
     CLOUD_WORDS,
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from ..clouds.points import Request
     from ..kilometres.axes import PlacedAxes
     from ..progress import Progress
-    from .lines import Lines
+    from .lines import LayerLines
     from .result import Result
     from .values import Values
 
@@ -187,7 +187,7 @@ def _courses(values: Values, request: Request, progress: Progress) -> tuple[Cour
     return tuple(made)
 
 
-def _lines(values: Values, name: str, request: Request, progress: Progress) -> Lines:
+def _lines(values: Values, name: str, request: Request, progress: Progress) -> LayerLines:
     """Read lines in the coordinate system of the cloud."""
     from ..clouds.crs import parse_crs, units
     from .features import read_lines_in
@@ -327,9 +327,9 @@ JOB = Job(
             transformed=True,
         ),
         replace(
-            shared.CLOUD,
+            inputs.CLOUD,
             name="POINTS",
-            help=f"The raw cloud: every class is read, withheld points are not. {shared.CLOUD.help}",
+            help=f"The raw cloud: every class is read, withheld points are not. {inputs.CLOUD.help}",
         ),
         LayerInput(
             "RAILS",
@@ -403,14 +403,14 @@ JOB = Job(
             high=MAX_DISTANCE_M,
         ),
         replace(
-            shared.STEP,
+            methods.STEP,
             label="Step of the stations [m]",
             help="Distance between the stations along each track at which margins are given.",
             high=100.0,
         ),
-        *shared.AREA,
-        shared.WORKERS,
-        *shared.axis(optional=True),
+        *inputs.AREA,
+        methods.WORKERS,
+        *inputs.axis(optional=True),
     ),
     (
         LayerOutput(

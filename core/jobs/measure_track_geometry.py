@@ -11,7 +11,7 @@ from ..fields import QUALITY_FIELDS
 from ..parameters import Parameters
 from ..progress import Recording
 from ..standards import CUSTOM, RailStandard, resolve
-from . import outputs, shared
+from . import inputs, methods, outputs
 from .declaration import CLOUD_NEEDS, RAIL_WORDS, TRACK_WORDS, Job, LayerInput
 
 if TYPE_CHECKING:
@@ -119,23 +119,23 @@ JOB = Job(
             "The rails of these tracks: those named in left_ids and right_ids, otherwise the nearest.",
         ),
         replace(
-            shared.CLOUD,
+            inputs.CLOUD,
             name="POINTS",
             help="The cloud from which the rails were extracted: it gives heights, sigma_mm and points for each "
             "station.",
             optional=True,
         ),
-        shared.STEP,
+        methods.STEP,
         replace(
-            shared.STANDARD,
+            inputs.STANDARD,
             help="Rail profile, which gives the railhead width, and the gauge that findings compare with.",
         ),
-        replace(shared.GAUGE, help="Gauge that findings compare with, instead of that of the standard."),
-        shared.HEAD_WIDTH,
-        shared.OTHER_GAUGES,
-        shared.LEFT_OUT,
-        shared.WORKERS,
-        *shared.axis(optional=True),
+        replace(inputs.GAUGE, help="Gauge that findings compare with, instead of that of the standard."),
+        inputs.HEAD_WIDTH,
+        methods.OTHER_GAUGES,
+        inputs.LEFT_OUT,
+        methods.WORKERS,
+        *inputs.axis(optional=True),
     ),
     (
         replace(outputs.QUALITY_OUTPUT, name="OUTPUT"),

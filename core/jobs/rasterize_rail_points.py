@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ..frpdf.models import choose
-from . import shared
+from . import inputs
 from .declaration import CLOUD_WORDS, RAIL_WORDS, STEPS, Job, RasterOutput
 
 if TYPE_CHECKING:
@@ -22,8 +22,8 @@ def _check(values: Values) -> None:
 
 def _run(values: Values, progress: Progress) -> Result:
     """Rasterize each class."""
-    from ..checks.density import plausible
-    from ..files.raster_file import header_for
+    from ..checks.points import plausible
+    from ..files.rail_rasters import header_for
     from ..raster import cell_size, rasterize
     from ..tiles.grid import MemorySource
     from .clouds import read_points
@@ -50,7 +50,7 @@ JOB = Job(
     "Empty areas take no space in the file, so a raster may cover a whole railway line.",
     (*RAIL_WORDS, *CLOUD_WORDS, "raster", "cells", "image"),
     (("numpy",), ("laspy",), ("lazrs",), ("pyproj",)),
-    (shared.CLOUD, shared.RAIL_CLASSES, *shared.RAIL, *shared.AREA),
+    (inputs.CLOUD, inputs.RAIL_CLASSES, *inputs.RAIL, *inputs.AREA),
     (
         RasterOutput(
             "OUTPUT",

@@ -16,7 +16,7 @@ from ..files.layers import AnyLayer, written_by_name
 if TYPE_CHECKING:
     import geopandas
 
-    from ..files.raster_file import RasterHeader
+    from ..files.rail_rasters import RasterHeader
     from ..frame import LocalFrame
     from ..raster import RailRaster
 
@@ -68,18 +68,7 @@ class Result:
     found: Any = None
 
     def to_geodataframe(self, layer: str) -> geopandas.GeoDataFrame:
-        """Return a layer as a table, with the fields of docs/reference.md and the coordinate system.
-
-        Parameters
-        ----------
-        layer : str
-            Name of an output, such as "elements".
-
-        Raises
-        ------
-        ParameterError
-            There is no such layer, or a package is not installed.
-        """
+        """Return a layer, such as "elements", as a table with the fields of docs/reference.md."""
         geopandas = package("geopandas")
         (written,) = self._made([layer])
         from ..files.writing import shapes_of
@@ -90,19 +79,9 @@ class Result:
     def save(self, path: str | Path, layer: str | None = None) -> None:
         """Write the layers into a GeoPackage, whose other layers stay, or one layer into a DXF or CSV file.
 
-        Parameters
-        ----------
-        path : path
-            Ends in .gpkg, .dxf or .csv.
-        layer : str, optional
-            Name of an output. Without it, a GeoPackage gets all layers, and another file the first.
-
-        Raises
-        ------
-        ParameterError
-            There is no such layer or format, or a package is not installed.
-        DiskError
-            The file can't be written.
+        The path ends in .gpkg, .dxf or .csv. Without the name of a layer, a GeoPackage gets all layers, and another
+        file the first. Raises ParameterError for an unknown layer or format, or a missing package, and DiskError if the
+        file can't be written.
         """
         suffix = Path(path).suffix.lower()
         if suffix not in FORMATS:
@@ -114,15 +93,7 @@ class Result:
         write_layers(made, Destination.at(Path(path)), self.frame)
 
     def report(self, path: str | Path) -> None:
-        """Write the report, an HTML page.
-
-        Raises
-        ------
-        ParameterError
-            The job has none.
-        DiskError
-            The file can't be written.
-        """
+        """Write the report, an HTML page; raise ParameterError if the job has none."""
         if "REPORT" not in self.pages:
             raise ParameterError("This result has no report: save its layers.")
         Destination.at(Path(path)).write_text(self.pages["REPORT"]())
@@ -139,13 +110,7 @@ class Result:
 
 
 def package(name: str) -> ModuleType:
-    """Import a package that not every installation has.
-
-    Raises
-    ------
-    ParameterError
-        It is not installed.
-    """
+    """Import a package that not every installation has; raise ParameterError if it is not installed."""
     try:
         return import_module(name)
     except ImportError as error:

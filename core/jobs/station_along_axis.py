@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from ..errors import CrsError, RailExtractError
 from ..fields import EXTENT_FIELDS, STATION_FIELDS
-from . import shared
+from . import inputs
 from .declaration import ALIGNMENT, LINE_NEEDS, PLACES, RAIL_WORDS, Figure, Job, LayerInput, LayerOutput
 
 if TYPE_CHECKING:
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from ..kilometres.axes import PlacedAxes
     from ..progress import Progress
-    from .places import Places
+    from .features import PlacedFeatures
     from .result import Result
     from .values import Values
 
@@ -31,13 +31,7 @@ def _check(values: Values) -> None:
 
 
 def _plane(values: Values) -> str | None:
-    """Return the coordinate system in which kilometres are measured: that of the axis, else that of the places.
-
-    Raises
-    ------
-    CrsError
-        Those that are known are in degrees.
-    """
+    """Return the coordinate system in which kilometres are measured: that of the axis, else that of the places."""
     from ..clouds.crs import is_geographic, parse_crs
     from ..kilometres.axes import AXIS_IN_DEGREES
 
@@ -83,7 +77,7 @@ def _run(values: Values, progress: Progress) -> Result:
     )
 
 
-def _extents_km(places: Places, known: np.ndarray, axes: PlacedAxes, progress: Progress) -> list[np.ndarray]:
+def _extents_km(places: PlacedFeatures, known: np.ndarray, axes: PlacedAxes, progress: Progress) -> list[np.ndarray]:
     """Return the smallest and the largest kilometre of the vertices of features, (n,) each; NaN without any."""
     import numpy as np
 
@@ -113,7 +107,7 @@ JOB = Job(
             "Points, lines or polygons. A line counts where it is half way, a polygon at a place inside.",
             kinds=(PLACES,),
         ),
-        *shared.axis(optional=False),
+        *inputs.axis(optional=False),
     ),
     (
         LayerOutput(

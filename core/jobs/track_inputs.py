@@ -13,10 +13,9 @@ from ..frame import LocalFrame
 from ..progress import Progress
 from ..rails import Centerline, RailLine, TrackGeometry
 from ..standards import RAIL_CLASS
-from ..tiles.spool import SpooledPoints
-from .area_points import Area, spool_points_in
-from .clouds import Bounds
-from .reading import way
+from ..tiles.store import SpooledPoints
+from .clouds import Area, Bounds, spool_points_in
+from .lines import way
 from .values import Values
 
 MARGIN_M = 1.0
@@ -31,15 +30,7 @@ MAX_GAUGE_NOISE_MM = 1.0
 
 @dataclass(frozen=True)
 class TrackInputs:
-    """Lines and points in one local frame.
-
-    Attributes
-    ----------
-    clouds : tuple of SpooledPoints
-        One for each class of the rails; empty without a cloud.
-    frame : LocalFrame
-        Converts between local metres and the centerlines' coordinates.
-    """
+    """Lines and points in one local frame; there is a cloud for each class of the rails, none without a cloud."""
 
     centerlines: tuple[Centerline, ...]
     rails: tuple[RailLine, ...]
@@ -50,11 +41,8 @@ class TrackInputs:
 def read_inputs(values: Values, folder: Path, progress: Progress) -> TrackInputs:
     """Read INPUT and RAILS, and sort the points of POINTS around the rails into squares in a folder.
 
-    Raises
-    ------
-    RailExtractError
-        The coordinate systems differ or are in degrees, the cloud has no points of a rail's class in the area, or a
-        layer has no line.
+    Raises RailExtractError if the coordinate systems differ or are in degrees, the cloud has no points of a rail's
+    class in the area, or a layer has no line.
     """
     centerlines, rails = values.lines("INPUT", progress.span(0.0, 0.1)), values.lines("RAILS", progress.span(0.1, 0.2))
     tracks, lines, frame = centerlines.centerlines(), rails.rails(progress, RAIL_CLASS), centerlines.frame
@@ -74,15 +62,7 @@ def read_inputs(values: Values, folder: Path, progress: Progress) -> TrackInputs
 def check_gauges(tracks: TrackInputs, measured: Sequence[TrackGeometry], progress: Progress) -> None:
     """Warn of tracks without two rails, and of a gauge that contradicts the fields because the head width is wrong.
 
-    Parameters
-    ----------
-    measured : sequence of TrackGeometry
-        One for each centerline.
-
-    Raises
-    ------
-    RailExtractError
-        No centerline has rails on both sides.
+    Takes one measurement for each centerline; raises RailExtractError if no centerline has rails on both sides.
     """
     found = np.array([_mean(track.gauge_mm) for track in measured])
     lonely = [str(track.track_id) for track, gauge in zip(measured, found) if np.isnan(gauge)]

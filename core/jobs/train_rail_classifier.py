@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 from ..parameters import DEFAULT_EPOCHS
 from ..progress import Estimating, Until
 from ..standards import SEARCHED_CLASSES
-from . import outputs, shared
+from . import inputs, methods, outputs
 from .declaration import CLOUD_NEEDS, CLOUD_WORDS, RAIL_WORDS, RAW_CLOUDS, Figure, FileInput, FileOutput, Job, Number
 
 if TYPE_CHECKING:
-    from ..learned.examples import Plan
+    from ..learned.blocks import Plan
     from ..progress import Progress
     from .result import Result
     from .values import Values
@@ -23,7 +23,7 @@ MAX_EPOCHS, MAX_SEED = 10_000, 2**31 - 1
 
 def _plan(values: Values) -> Plan:
     """Return what the training is given, besides the cloud."""
-    from ..learned.examples import Plan
+    from ..learned.blocks import Plan
 
     return Plan(values.class_codes(), values["EPOCHS"], values["SEED"], values["DEVICE"], values["START"])
 
@@ -80,10 +80,10 @@ JOB = Job(
     (*RAIL_WORDS, *CLOUD_WORDS, "classification", "training", "RandLA-Net", "deep learning", "neural network"),
     (*CLOUD_NEEDS, ("torch",)),
     (
-        shared.CLOUD,
-        shared.RAIL_CLASSES,
-        *shared.RAIL,
-        *shared.AREA,
+        inputs.CLOUD,
+        inputs.RAIL_CLASSES,
+        *inputs.RAIL,
+        *inputs.AREA,
         Number(
             "EPOCHS",
             "Epochs",
@@ -100,7 +100,7 @@ JOB = Job(
             "plugin: fewer labels and epochs do. Leave empty to start from random weights.",
             advanced=True,
             optional=True,
-            kinds=shared.WEIGHT_FILES,
+            kinds=methods.WEIGHT_FILES,
         ),
         Number(
             "SEED",
@@ -119,7 +119,7 @@ JOB = Job(
             optional=True,
         ),
         replace(
-            shared.DEVICE,
+            methods.DEVICE,
             label="Device of the training",
             help="CPU, or CUDA for an Nvidia GPU. AUTO uses the GPU if there is one.",
         ),
@@ -130,7 +130,7 @@ JOB = Job(
             "Weights of the classifier",
             "The trained classifier. Until the training is complete, a folder next to it keeps what was learned, and a "
             "run with the same name continues.",
-            kinds=shared.WEIGHT_FILES,
+            kinds=methods.WEIGHT_FILES,
         ),
         FileOutput(
             "CARD",

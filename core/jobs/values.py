@@ -30,15 +30,14 @@ from .declaration import Job
 if TYPE_CHECKING:
     import numpy as np
 
-    from ..airborne.survey import Guide
+    from ..airborne.survey import GuideLine
     from ..clouds.points import Request
     from ..files.rail_rasters import RasterSource
     from ..kilometres.axes import PlacedAxes
     from ..progress import Progress
     from ..run.loop import Runner
-    from .features import Source
-    from .lines import Lines
-    from .places import Places
+    from .features import FeatureSource, PlacedFeatures
+    from .lines import LayerLines
 
 NUMBERS = {
     "SMOOTHING_XY": "smoothing_xy_m",
@@ -122,7 +121,7 @@ class Values(ABC):
         """Provide the runner with as many processes as WORKERS asks for."""
 
     @abstractmethod
-    def source(self, name: str) -> Source:
+    def source(self, name: str) -> FeatureSource:
         """Return a vector layer or a table."""
 
     @abstractmethod
@@ -161,7 +160,7 @@ class Values(ABC):
 
         return read_rows(self.source(name), progress)
 
-    def lines(self, name: str, progress: Progress) -> Lines:
+    def lines(self, name: str, progress: Progress) -> LayerLines:
         """Read the lines of a layer; see `read_lines`."""
         from .features import read_lines
 
@@ -173,9 +172,9 @@ class Values(ABC):
 
         return self.once("axes", lambda: read_axes(self, crs_wkt))
 
-    def places(self, name: str, plane: str | None, progress: Progress) -> Places:
+    def places(self, name: str, plane: str | None, progress: Progress) -> PlacedFeatures:
         """Read the features of a layer of any kind, in the plane of the axes; see `places_of`."""
-        from .places import places_of
+        from .features import places_of
 
         return places_of(self.source(name), plane, progress)
 
@@ -185,7 +184,7 @@ class Values(ABC):
 
         return self.once("lines along", lambda: read_lines_along(self.source(name), crs_wkt))
 
-    def guides(self, name: str, crs_wkt: str | None) -> Sequence[Guide]:
+    def guides(self, name: str, crs_wkt: str | None) -> Sequence[GuideLine]:
         """Read such lines with what they state of their tracks; see `read_guides`."""
         from .features import read_guides
 
@@ -242,13 +241,7 @@ class Values(ABC):
         return GrowParameters(**self._stated(GROWTH))
 
     def has_axis(self) -> bool:
-        """Return whether AXIS is filled in.
-
-        Raises
-        ------
-        ParameterError
-            It is not, but what states its kilometres is.
-        """
+        """Return whether AXIS is filled in; raise ParameterError if only what states its kilometres is."""
         lone = next((name for name in ("START_KM", "POSTS", "JUMPS") if self.filled(name)), None)
         if lone and not self.filled("AXIS"):
             raise ParameterError(f"{lone} needs the line that it applies to: choose AXIS.")
@@ -256,18 +249,12 @@ class Values(ABC):
 
     def engine(self) -> str:
         """Read ENGINE, and check that it is installed and runs on DEVICE."""
-        from ..frpdf.engines import choose_engine
+        from ..frpdf.engine import choose_engine
 
         return choose_engine(self["ENGINE"], self["DEVICE"])
 
     def weights(self) -> Path | None:
-        """Read METHOD and WEIGHTS: the weights of the network that finds rail points, or None for geometry.
-
-        Raises
-        ------
-        ParameterError, ModelError
-            They contradict each other, or can't be used.
-        """
+        """Read METHOD and WEIGHTS: the weights of the network that finds rail points, or None for geometry."""
         from ..learned.model import weights_for
 
         return weights_for(self["METHOD"], self["WEIGHTS"])
@@ -308,13 +295,7 @@ class Values(ABC):
 
 
 def class_numbers(text: str, what: str) -> tuple[int, ...]:
-    """Parse classes such as "10,11"; `what` is the name of the parameter, for the error.
-
-    Raises
-    ------
-    ParameterError
-        The text is not a list of classes, or is empty.
-    """
+    """Parse classes such as "10,11"; `what` is the name of the parameter, for the error."""
     words = [word for word in re.split(r"[;,\s]+", text) if word]
     if not words or not all(map(is_class, words)):
         raise ParameterError(f'{what} "{text}" must be whole numbers from 0 to {LAST_CLASS} such as 10 or 10,11.')

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ..fields import RAILS
-from . import outputs, shared
+from . import inputs, methods, outputs
 from .declaration import CLOUD_NEEDS, CLOUD_WORDS, RAIL_WORDS, STEPS, Job
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ def _run(values: Values, progress: Progress) -> Result:
     from ..checks.lines import warn_of_rails
     from ..files.layers import lines_layer
     from ..squares.steps import lines_of
-    from .area_points import Area, read_points_in
+    from .clouds import Area, read_points_in
     from .result import Result, ShownCloud
 
     source, header = values.raster("INPUT"), values.raster("INPUT").header
@@ -63,13 +63,7 @@ def _run(values: Values, progress: Progress) -> Result:
 
 
 def moved(raster: RailRaster, frame: LocalFrame, other: LocalFrame) -> RailRaster:
-    """Return a raster in another local frame of the same coordinate system.
-
-    Parameters
-    ----------
-    frame, other : LocalFrame
-        Present frame and new frame.
-    """
+    """Return a raster of one frame in another local frame of the same coordinate system."""
     right, up, _ = frame.shift_to(other)
     return replace(raster, x0=raster.x0 + float(right), y0=raster.y0 + float(up))
 
@@ -85,17 +79,17 @@ JOB = Job(
     (*RAIL_WORDS, *CLOUD_WORDS, "raster", "vectorize", "line", "3d"),
     CLOUD_NEEDS,
     (
-        shared.RASTER,
+        inputs.RASTER,
         replace(
-            shared.CLOUD,
+            inputs.CLOUD,
             name="POINTS",
             help="The cloud from which the raster was made: it moves the lines onto the railheads and gives them "
             "heights.",
             optional=True,
         ),
-        *shared.LINES,
-        *shared.RASTER_RAIL,
-        shared.LEFT_OUT,
+        *methods.LINES,
+        *inputs.RASTER_RAIL,
+        inputs.LEFT_OUT,
     ),
     (replace(outputs.RAILS_OUTPUT, name="OUTPUT", optional=False),),
     outputs.RAIL_FIGURES,

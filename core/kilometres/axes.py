@@ -12,16 +12,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..design_numbers import KM, LENGTH, NUMBER, checked, number_in, quoted
-from ..design_places import are_places, check_places
+from ..design_numbers import KM, LENGTH, NUMBER, are_places, check_places, checked, number_in, quoted
 from ..errors import RailExtractError
 from ..frame import LocalFrame
 from ..polyline import Polyline
 from ..progress import SILENT, Progress
 from ..rails import Kilometres, TrackGeometry
 from .line import KilometreLine, locate, nearest
-from .stationing import Jump, Stationing, stationing_of
-from .text import read_km
+from .stationing import Jump, Stationing, read_km, stationing_of
 
 POST_OFFSET_M = 50.0
 """Posts further than this from the axis are left out, metres: they belong to another line."""
@@ -38,17 +36,7 @@ UNIT_OFF = 0.2
 
 @dataclass(frozen=True)
 class AxisLine:
-    """A line of an axis as it is stored.
-
-    Attributes
-    ----------
-    name : str
-        Of its axis.
-    xy : (n, 2) array
-        Metres.
-    m : (n,) array
-        M values, NaN where there is none.
-    """
+    """A line as it is stored: name of its axis, `xy`, (n, 2) metres, and M values, (n,), NaN where there is none."""
 
     name: str
     xy: np.ndarray
@@ -64,7 +52,7 @@ class Post:
 
 
 @dataclass(frozen=True)
-class Start:
+class AxisStart:
     """The kilometre at the first vertex of a line, and whether kilometres decrease along it."""
 
     km: float
@@ -73,34 +61,19 @@ class Start:
 
 @dataclass(frozen=True)
 class Axes:
-    """Axes in one plane.
-
-    Attributes
-    ----------
-    notices : tuple of str
-        What the user is told of them.
-    """
+    """Axes in one plane, and what the user is told of them."""
 
     axes: tuple[KilometreLine, ...]
     notices: tuple[str, ...]
 
 
 def make_axes(
-    lines: Sequence[AxisLine], start: Start | None = None, posts: Sequence[Post] = (), jumps: Sequence[Jump] = ()
+    lines: Sequence[AxisLine], start: AxisStart | None = None, posts: Sequence[Post] = (), jumps: Sequence[Jump] = ()
 ) -> Axes:
     """Give lines their kilometres by posts, else by a first kilometre, else by their M values.
 
-    Parameters
-    ----------
-    lines : sequence of AxisLine
-        At least one; those of one name that follow each other are joined.
-    jumps : sequence of Jump
-        Stated jumps; M values contain theirs.
-
-    Raises
-    ------
-    RailExtractError
-        Nothing states kilometres, or what does contradicts itself or is on no railway.
+    Lines of one name that follow each other are joined. `jumps` are those that are stated; M values contain theirs.
+    Raises RailExtractError if nothing states kilometres, or what does contradicts itself or is on no railway.
     """
     lines = [replace(line, name=" ".join(line.name.split())) for line in lines]  # for messages, which have one line
     _check(lines, start, posts)
@@ -124,7 +97,7 @@ def make_axes(
     return _told([_by_measures(line) for line in joined])
 
 
-def _check(lines: Sequence[AxisLine], start: Start | None, posts: Sequence[Post]) -> None:
+def _check(lines: Sequence[AxisLine], start: AxisStart | None, posts: Sequence[Post]) -> None:
     """Refuse lines, a start and posts that are on no railway; where they are read, kilometres are checked."""
     for number, line in enumerate(lines, start=1):
         where = f"The line {line.name or number} of AXIS"
@@ -265,16 +238,9 @@ BACK, AHEAD = "km_back", "km_ahead"
 
 @dataclass(frozen=True)
 class PlacedAxes:
-    """Axes in the plane of a coordinate system.
+    """Axes in the plane of a coordinate system, in metres from its zero; `notation` is one of `text.NOTATIONS`.
 
-    Attributes
-    ----------
-    axes : Axes
-        In metres from the zero of the coordinate system.
-    unit_m : float
-        Length of the unit of its coordinates.
-    notation : str
-        One of `text.NOTATIONS`.
+    `unit_m` is the length of the unit of its coordinates.
     """
 
     axes: Axes
@@ -323,13 +289,7 @@ class PlacedAxes:
 
 
 def post_field(names: Collection[str]) -> str:
-    """Return the field of a post layer with the kilometre.
-
-    Raises
-    ------
-    RailExtractError
-        It has none of the usual ones.
-    """
+    """Return the field of a post layer with the kilometre; raise RailExtractError if it has none of the usual ones."""
     found = next((one for one in KM_FIELDS if one in names), "")
     if not found:
         raise RailExtractError(
@@ -356,13 +316,7 @@ def check_jumps(names: Collection[str]) -> None:
 
 
 def km_of(value: object, field: str, name: str, feature: int) -> float:
-    """Return the kilometre in a field of a layer's feature, a number or a text such as 12.3+45.
-
-    Raises
-    ------
-    RailExtractError
-        It is something else.
-    """
+    """Return the kilometre in a field of a layer's feature, a number or a text such as 12.3+45."""
     km = read_km(value) if isinstance(value, str) else number_in(value)
     if km is not None and KM.holds(km):
         return km

@@ -15,8 +15,7 @@ from scipy.spatial import cKDTree
 from ..polyline import Chords, Polyline, cross
 from ..progress import SILENT, Progress
 from ..rails import Kilometres
-from .stationing import Stationing
-from .text import write_km
+from .stationing import Stationing, write_km
 
 PIECE_M = 10.0
 """Longest part of a segment of the axis among which the nearest is sought, metres."""
@@ -42,17 +41,11 @@ PLACES_AT_ONCE = 5_000
 
 
 @dataclass(frozen=True)
-class Feet:
-    """Feet of places on an axis; (n,) arrays.
+class AxisFeet:
+    """Feet of places on an axis; (n,) arrays, metres.
 
-    Attributes
-    ----------
-    s : float
-        Plan distance of the foot from the first vertex, metres.
-    left_m : float
-        Distance of the place from its foot, positive to the left.
-    beyond_m : float
-        How far the place lies beyond the nearer end, 0 between the ends.
+    `s` is the plan distance of the foot from the first vertex, `left_m` that of the place from its foot, positive to
+    the left, and `beyond_m` how far the place lies beyond the nearer end, 0 between the ends.
     """
 
     s: np.ndarray
@@ -67,12 +60,9 @@ class Feet:
 
 @dataclass(frozen=True)
 class KilometreLine:
-    """A line that carries the kilometres of a railway, directed with them.
+    """A line, `xy` (n, 2) metres, that carries the kilometres of a railway, directed with them.
 
-    Attributes
-    ----------
-    xy : (n, 2) array
-        Vertices, metres; no two successive ones are equal.
+    No two successive vertices are equal.
     """
 
     name: str
@@ -99,7 +89,7 @@ class KilometreLine:
         samples = self.line.resampled(SAMPLE_M)
         return cKDTree(samples.xy), samples.t
 
-    def feet(self, xy: np.ndarray) -> Feet:
+    def feet(self, xy: np.ndarray) -> AxisFeet:
         """Find the feet of places, (k, 2) metres.
 
         The foot is on the normal through the place. Normals turn evenly from the bisector at one vertex to that at the
@@ -121,7 +111,7 @@ class KilometreLine:
         share = np.where(on_fan, shares[best, places], np.clip(plain, 0.0, 1.0))
         side = np.sign(cross(self._steps[segment], xy - self._place(segment, share)))
         across = np.sqrt(np.maximum(self._away(segment, share, xy) ** 2 - beyond**2, 0.0))
-        return Feet(self.line.t[segment] + share * np.diff(self.line.t)[segment], side * across, beyond)
+        return AxisFeet(self.line.t[segment] + share * np.diff(self.line.t)[segment], side * across, beyond)
 
     @cached_property
     def _steps(self) -> np.ndarray:
@@ -229,16 +219,10 @@ def _groups(axis: np.ndarray) -> Iterator[tuple[int, np.ndarray]]:
 
 @dataclass(frozen=True)
 class Nearest:
-    """The nearest axis of places; (n,) arrays.
+    """The nearest axis of places, -1 without one, and their feet on it as in `AxisFeet`; (n,) arrays.
 
-    Attributes
-    ----------
-    axis : int
-        Its number; -1 without one.
-    s, left_m, distance_m : float
-        See `Feet`.
-    second_m : float
-        Distance of the axis that is the nearest but one; infinity without one, or where it is clearly farther away.
+    `second_m` is the distance of the axis that is the nearest but one; infinity without one, or where it is clearly
+    farther away.
     """
 
     axis: np.ndarray
@@ -247,7 +231,7 @@ class Nearest:
     distance_m: np.ndarray
     second_m: np.ndarray
 
-    def put(self, number: int, mine: np.ndarray, feet: Feet, beyond_m: float) -> None:
+    def put(self, number: int, mine: np.ndarray, feet: AxisFeet, beyond_m: float) -> None:
         """Take note of the feet of some places on an axis."""
         distance_m, known_m = np.where(feet.beyond_m <= beyond_m, feet.distance_m, np.inf), self.distance_m[mine]
         closer = distance_m < known_m

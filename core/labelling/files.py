@@ -10,18 +10,17 @@ from pathlib import Path
 import numpy as np
 
 from ..classify.settings import Settings
+from ..clouds.header import catalogue_text
 from ..clouds.points import Request
 from ..clouds.readers import CATALOGUE, SUFFIXES, list_files
 from ..clouds.rewriting import Places, check_class, rewrite
-from ..clouds.vpc import catalogue_text
-from ..disk import NEW, Destination, alone_in, identity, replace_folder, writing
+from ..disk import NEW, Destination, alone_in, identity, replace_folder, scratch_folder, writing
 from ..errors import DiskError, ParameterError, RailExtractError
 from ..grow.growth import Stop
 from ..progress import SILENT, Progress
 from ..rails import SearchFigures
 from ..run.loop import Runner
 from ..run.tasks import READ_S, Context, Task
-from ..scratch import scratch_folder
 from ..standards import RAIL_CLASS
 from .finding import find_rail_points, report
 
@@ -32,17 +31,10 @@ COPC = ".copc"
 
 
 @dataclass(frozen=True)
-class Choice:
-    """What is written.
+class Content:
+    """What is written: the class of rail points, and whether other points are left out.
 
-    Attributes
-    ----------
-    class_code : int
-        Class of rail points.
-    only_rails : bool
-        Whether other points are left out.
-    reset : bool
-        Whether points that have the rail class and are not found lose it.
+    With `reset`, points that have the rail class and are not found lose it.
     """
 
     class_code: int = RAIL_CLASS
@@ -51,17 +43,10 @@ class Choice:
 
 
 @dataclass(frozen=True)
-class Output:
-    """Files to write.
+class OutputFiles:
+    """Files to write: the one that opens the result (the only one, or the catalogue of the tiles), and names of tiles.
 
-    Attributes
-    ----------
-    destination : Destination
-        The file that opens the result: the only one, or the catalogue of the tiles.
-    names : tuple of str
-        Name of each tile; empty for a single file.
-    before : tuple of int or None
-        Identity of the folder of the tiles that was there when the run began.
+    `before` is the identity of the folder of the tiles that was there when the run began.
     """
 
     destination: Destination
@@ -80,18 +65,11 @@ class Output:
 
 
 @dataclass(frozen=True)
-class Result:
-    """What was written.
+class ClassifiedFiles:
+    """What was written: the file of `OutputFiles`, the number of points that were read, and the figures of the search.
 
-    Attributes
-    ----------
-    file : Path
-        See `Output`.
-    point_count : int
-        Points in the files that were read.
-    stops : tuple of Stop
-        Where rails that grew from seeds were not followed further, in metres from the zero of the request; each place
-        once.
+    `stops` are where rails that grew from seeds were not followed further, in metres from the zero of the request; each
+    place once.
     """
 
     file: Path
@@ -104,28 +82,13 @@ def _folder_at(catalogue: Path) -> Path:
     return Path(os.path.realpath(catalogue.with_suffix("")))
 
 
-def plan_output(paths: Sequence[Path], output: Path, class_code: int, progress: Progress = SILENT) -> Output:
-    """Decide which files to write for an input, and check that this is possible.
+def plan_output(paths: Sequence[Path], output: Path, class_code: int, progress: Progress = SILENT) -> OutputFiles:
+    """Decide which files to write for an input (files, folders, virtual point clouds), and check that this is possible.
 
-    Parameters
-    ----------
-    paths : sequence of Path
-        The input: files, folders or virtual point clouds.
-    output : Path
-        Where the user wants the result. For tiles, its name without the suffix is that of their folder.
-    class_code : int
-        Class of rail points.
-    progress : Progress
-        Receives a warning if a COPC file was asked for.
-
-    Raises
-    ------
-    CloudError
-        A path does not lead to cloud files.
-    DiskError
-        Nothing can be written there.
-    ParameterError
-        The output has no suffix of a cloud, would replace the input, or its format lacks the class.
+    `output` is where the user wants the result; for tiles, its name without the suffix is that of their folder. Warns
+    if a COPC file was asked for. Raises CloudError if a path does not lead to cloud files, DiskError if nothing can be
+    written there, and ParameterError if the output has no suffix of a cloud, would replace the input, or its format
+    lacks the class.
     """
     files = list_files(paths)
     for file in files:
@@ -145,37 +108,23 @@ def plan_output(paths: Sequence[Path], output: Path, class_code: int, progress: 
         raise ParameterError("The classified cloud would replace the cloud that is read: choose another name.")
     if names:
         _check_folder(folder, names)
-    return Output(Destination.at(main), names, identity(folder) if names else None)
+    return OutputFiles(Destination.at(main), names, identity(folder) if names else None)
 
 
 def classify_files(
     request: Request,
     settings: Settings,
-    choice: Choice,
-    output: Output,
+    choice: Content,
+    output: OutputFiles,
     folder: Path,
     runner: Runner,
     progress: Progress = SILENT,
-) -> Result:
-    """Find the rail points of a cloud and write its files with their classes.
+) -> ClassifiedFiles:
+    """Find the rail points of a cloud, in `standards.SEARCHED_CLASSES`, and write its files with their classes.
 
-    Parameters
-    ----------
-    request : Request
-        Files, `standards.SEARCHED_CLASSES` classes and extent.
-    output : Output
-        From `plan_output`, for the files of the request.
-    folder : Path
-        Existing folder for temporary files, 42 bytes per point; the caller removes it.
-    runner : Runner
-        Its results are complete, or there is no output.
-
-    Raises
-    ------
-    CloudError, NoRailPointsError, DiskError
-        See `finding.find_rail_points`; `DiskError` also if another program has changed an output.
-    RailExtractError
-        A square could not be searched.
+    `output` is from `plan_output`, for the files of the request. The caller removes the folder, which gets 42 bytes per
+    point. Results of the runner are complete, or there is no output. Raises DiskError also if another program has
+    changed an output, and RailExtractError if a square could not be searched.
     """
     finding, rewriting = progress.divide((2.0, 1.0))
     labels = Labels(request, folder)
@@ -190,11 +139,11 @@ def classify_files(
     _check_complete(runner)
     report(figures, request, progress)
     write_labelled(request, choice, labels, output, runner, rewriting)
-    return Result(output.file, labels.point_count, figures)
+    return ClassifiedFiles(output.file, labels.point_count, figures)
 
 
 def write_labelled(
-    request: Request, choice: Choice, labels: Labels, output: Output, runner: Runner, progress: Progress
+    request: Request, choice: Content, labels: Labels, output: OutputFiles, runner: Runner, progress: Progress
 ) -> None:
     """Write the files of a cloud with the classes that follow from the labels; see `classify_files`."""
     progress.status("Writing the classes")
@@ -244,7 +193,7 @@ class Labels:
 class _Writer:
     """Writes the files of a cloud with their new classes."""
 
-    def __init__(self, request: Request, choice: Choice, labels: Labels) -> None:
+    def __init__(self, request: Request, choice: Content, labels: Labels) -> None:
         self._request, self._choice, self._labels = request, choice, labels
 
     def write(self, place: int, new: Path, progress: Progress) -> int:
@@ -261,7 +210,7 @@ class _Writer:
 
         return rewrite(self._request.headers[place].path, new, change, progress)
 
-    def write_tiles(self, output: Output, runner: Runner, progress: Progress) -> None:
+    def write_tiles(self, output: OutputFiles, runner: Runner, progress: Progress) -> None:
         """Write all tiles into a temporary folder, then move it to its name and write the catalogue."""
         parent = output.folder.parent
         with writing(parent), scratch_folder(parent) as scratch:
@@ -326,7 +275,7 @@ def _check_folder(folder: Path, names: Sequence[str]) -> None:
         raise DiskError(f"{folder} exists and holds other files: choose another name.")
 
 
-def _move_tiles(output: Output, scratch: Path) -> None:
+def _move_tiles(output: OutputFiles, scratch: Path) -> None:
     """Move a new folder of tiles to its name; the old one stays if that fails, or if it was changed."""
     folder = output.folder
     with alone_in(folder.parent):

@@ -46,16 +46,9 @@ file states: a square of 41 m with rails has thousands of points, and each squar
 
 @dataclass(frozen=True)
 class Found:
-    """The rail points of a square.
+    """The rail points of a square: `xyz`, (k, 3) in units of the CRS, and their numbers among all points of all files.
 
-    Attributes
-    ----------
-    xyz : (k, 3) array
-        Units of the CRS.
-    number : (k,) int array
-        Their numbers among all points of all files.
-    marks : (k,) uint32 array
-        What tells their passes apart, see `passes.marks_of`.
+    `marks`, (k,), tell their passes apart, as in `passes.marks_of`.
     """
 
     xyz: np.ndarray
@@ -67,31 +60,13 @@ class Found:
 def find_rail_points(
     request: Request, settings: Settings, folder: Path, runner: Runner, progress: Progress = SILENT
 ) -> Iterator[Found]:
-    """Find the points on railheads, square by square.
+    """Find the points on railheads, square by square, in the searched classes and the extent of a request.
 
-    Parameters
-    ----------
-    request : Request
-        Files, searched classes and extent.
-    folder : Path
-        Empty folder for the points of the squares, 36 bytes each and a third more for those near borders; the caller
-        removes it.
-    runner : Runner
-        Executes one task per file and one per square. Whether errors of single ones end the run is for it to decide.
-
-    Yields
-    ------
-    Found
-        Only for squares with rails; in the same order with any runner.
-
-    Raises
-    ------
-    CloudError
-        A file is damaged, or its points are too far apart; if the runner tolerates that, all of them are.
-    NoRailPointsError
-        The extent contains no points.
-    DiskError
-        The disk is full.
+    Yields squares with rails only, in the same order with any runner, which executes one task per file and one per
+    square and decides whether errors of single ones end the run. The caller removes the folder, empty at first, that
+    gets the points of the squares, 36 bytes each and a third more for those near borders. Raises CloudError if a file
+    is damaged (if the runner tolerates that, all of them) or its points are too far apart, and NoRailPointsError if the
+    extent contains no points.
     """
     reading, searching = progress.divide((1.0, 3.0))
     request.announce(progress)

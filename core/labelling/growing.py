@@ -18,8 +18,7 @@ from ..clouds.points import Request
 from ..disk import writing
 from ..errors import OffCloudError, OffRailError
 from ..grow.growth import APART, Growth, Growths, Stop, apart_first
-from ..grow.heads import OnHeads
-from ..grow.settings import GrowSettings
+from ..grow.heads import GrowSettings, OnHeads
 from ..polyline import Polyline
 from ..progress import SILENT, Progress
 from ..rails import SearchFigures
@@ -27,7 +26,7 @@ from ..raster import BORDER_CELLS, cell_size
 from ..run.loop import Runner
 from ..tiles.grid import Key
 from ..tiles.store import files_of, read_stored
-from .files import Choice, Labels, Output, Result, write_labelled
+from .files import ClassifiedFiles, Content, Labels, OutputFiles, write_labelled
 from .finding import POINT, box_of, sort_files
 
 LINE_STEP_M = 20.0
@@ -44,31 +43,18 @@ def grow_files(
     request: Request,
     seeds: Sequence[np.ndarray],
     settings: GrowSettings,
-    choice: Choice,
-    output: Output,
+    choice: Content,
+    output: OutputFiles,
     folder: Path,
     runner: Runner,
     progress: Progress = SILENT,
-) -> Result:
+) -> ClassifiedFiles:
     """Follow rails from seeds and write the files of a cloud with the classes of their points.
 
-    Parameters
-    ----------
-    request : Request
-        Files, `standards.SEARCHED_CLASSES` classes and extent.
-    seeds : sequence of (k, 2) array
-        Places on railheads, k = 1, or lines along them, in units of the CRS.
-    output : Output
-        From `files.plan_output`, for the files of the request.
-    folder : Path
-        Existing folder for temporary files, 36 bytes per point within reach; the caller removes it.
-
-    Raises
-    ------
-    CloudError, DiskError
-        See `files.classify_files`.
-    OffCloudError, OffRailError
-        No seed is in the cloud, or on a rail.
+    Seeds, (k, 2) in units of the CRS, are places on railheads, k = 1, or lines along them; the request has
+    `standards.SEARCHED_CLASSES`. `output` is from `files.plan_output`, for the files of the request. The caller removes
+    the folder, which gets 36 bytes per point within reach. Raises OffCloudError or OffRailError if no seed is in the
+    cloud, or on a rail.
     """
     growing, rewriting = progress.divide((7.0, 3.0))
     labels = Labels(request, folder)
@@ -79,7 +65,7 @@ def grow_files(
 
     growths, figures = grow_points(request, seeds, settings, folder, keep, growing)
     write_labelled(request, choice, labels, output, runner, rewriting)
-    return Result(output.file, labels.point_count, figures, _stops(growths))
+    return ClassifiedFiles(output.file, labels.point_count, figures, _stops(growths))
 
 
 def grow_points(
@@ -108,7 +94,7 @@ def grow_points(
 
 def grow_all(
     request: Request, seeds: Sequence[np.ndarray], settings: GrowSettings, folder: Path, progress: Progress = SILENT
-) -> tuple[Cloud, Growths]:
+) -> tuple[SeedCloud, Growths]:
     """Follow rails from seeds; returns the points that were read, and what grew, in metres.
 
     Parameters and errors are those of `grow_files`.
@@ -116,7 +102,7 @@ def grow_all(
     reading, growing = progress.divide((1.0, 1.0))
     owner, places = _in_cloud(request, seeds)
     request.announce(progress)
-    cloud = Cloud(request, places, settings, folder, reading)
+    cloud = SeedCloud(request, places, settings, folder, reading)
     progress.status("Following the rails")
     growths, is_on = Growths(cloud.heads, settings), np.zeros(len(seeds), dtype=bool)
     order = apart_first(places, APART * settings.parameters.max_length_m).tolist()
@@ -135,13 +121,10 @@ def grow_all(
     return cloud, growths
 
 
-class Cloud:
+class SeedCloud:
     """Points within reach of seeds, sorted into the squares of the classification on disk.
 
-    Parameters
-    ----------
-    places : (k, 2) array
-        Seeds, metres from the zero of the coordinate system.
+    `places`, (k, 2), are the seeds, metres from the zero of the coordinate system.
     """
 
     def __init__(

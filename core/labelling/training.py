@@ -15,14 +15,13 @@ import numpy as np
 
 from ..classify.settings import Settings
 from ..clouds.points import Request
-from ..disk import Destination, writing
+from ..disk import Destination, scratch_folder, writing
 from ..errors import NoRailPointsError, ParameterError
 from ..kernels import device_of
-from ..learned.examples import CHECKS, Examples, Plan, save_index, write_square
+from ..learned.blocks import CHECKS, Examples, Plan, save_index, write_square
 from ..learned.model import WEIGHTS_SUFFIX, check_torch, load, save
 from ..progress import SILENT, Progress
 from ..run.loop import Runner
-from ..scratch import scratch_folder
 from ..tiles.grid import Square
 from ..tiles.store import files_of, read_stored
 from .finding import POINT, sort_files
@@ -42,12 +41,8 @@ READING = 0.1
 def check_training(weights: Path, plan: Plan) -> None:
     """Check what can be checked before a cloud is read.
 
-    Raises
-    ------
-    ParameterError
-        The weights have another suffix.
-    ModelError
-        PyTorch or the CUDA device is missing, or the weights to start from are missing or something else.
+    Raises ParameterError if the weights have another suffix, and ModelError if PyTorch or the CUDA device is missing,
+    or the weights to start from are missing or something else.
     """
     if weights.suffix.lower() != WEIGHTS_SUFFIX:
         raise ParameterError(f"{weights.name} is not a name for weights: let it end in {WEIGHTS_SUFFIX}.")
@@ -67,22 +62,11 @@ def train_classifier(
 ) -> Trained:
     """Train a classifier on a labelled cloud and write its weights; continue if such a training was interrupted.
 
-    Parameters
-    ----------
-    request : Request
-        Files, `standards.SEARCHED_CLASSES` classes and extent.
-    weights : Destination
-        The .npz file. The folder `folder_of` it is removed once the weights are written.
-
-    Raises
-    ------
-    NoRailPointsError, ParameterError
-        Nothing can be learned from the labels, or the folder holds another training.
-    CloudError, DiskError, ModelError, Cancelled
-        See `finding.find_rail_points` and `learned.training.train`.
+    The request has the files, `standards.SEARCHED_CLASSES` and the extent. The folder `folder_of` the weights, an .npz
+    file, is removed once they are written. Raises NoRailPointsError or ParameterError if nothing can be learned from
+    the labels, or the folder holds another training.
     """
-    from ..learned.training import Settings as TrainingSettings
-    from ..learned.training import train
+    from ..learned.training import TrainingSettings, train
 
     folder = folder_of(weights.file)
     reading, learning = progress.divide((READING, 1 - READING))

@@ -2,20 +2,24 @@
 
 Gribov and Chang, section 3: a zone of heights in which rails lie, thinned ground, blocks of 4 x 4 m with at most 3000
 points each. The points of a block are in random order, so each layer of the network keeps the first quarter of those of
-the layer before.
+the layer before. Labelled blocks, from which the network learns, are on disk; some are kept back for validation.
 """
 
 from __future__ import annotations
 
+import json
 import math
+import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from ..classify.bed import Bed, Coarse
 from ..classify.tops import HIGH_M, LOW_M, TOP_M
+from ..errors import ParameterError
 from ..tiles.grid import Tiling
 
 BLOCK_M = 4.0
@@ -46,27 +50,38 @@ RATIO = 4
 LAYERS = 4
 """Levels of the pyramid, each coarser than the one below it."""
 
+POINT = np.dtype([("place", "<f4", 4), ("rail", "?"), ("core", "?"), ("rails", "<i4"), ("others", "<i4")])
+"""A point of a block: place as `blocks.centred` gives it, its label, whether it lies in the core, and the numbers of
+rail points and other points that it stands for."""
+
+ENTRY = np.dtype(
+    [("file", "<i4"), ("start", "<i8"), ("count", "<i4"), ("area", "<i8", 2), ("tile", "<i4"), ("rail", "<i4")]
+)
+"""A block in the index: file of the square, first point and number of points in it, area, tile of the cloud that most
+of its points come from, and number of rail points in the core."""
+
+AREAS = 2
+"""Areas along a side of a square: places of some 20 m are kept back together, because neighbouring blocks show the same
+rails."""
+
+VALIDATION_SHARE = 0.2
+"""Share of the areas kept back, at least one, with rails and without."""
+
+INDEX = "index.npy"
+
+CHECKS = "checks.json"
+"""File with the checksums of all others, written last."""
+
 
 @dataclass(frozen=True)
 class Thinned:
-    """The points of a square that the network sees.
+    """The points of a square that the network sees, and the cells in which the bed was found.
 
-    Attributes
-    ----------
-    number : (n,) int array
-        Their numbers among the points of the square, in an order that depends on their places only.
-    place : (n, 4) float32 array
-        Metres from the square's corner, the height counting from a multiple of `ORIGIN_STEP`; height above the bed.
-    railhigh : (n,) bool array
-        Points in the zone of railheads; only these can be on rails.
-    band : (m,) int array
-        Numbers of all points of the square in the zone of railheads.
-    band_place : (m, 3) float32 array
-        Their places.
-    stands_for : (m,) int array
-        The thinned point of their cube, for each.
-    coarse : Coarse
-        The cells in which the bed was found.
+    `number`, (n,), are their numbers among the points of the square, in an order that depends on their places only.
+    `place`, (n, 4) float32, is in metres from the square's corner, the height counting from a multiple of
+    `ORIGIN_STEP`, and the height above the bed. `railhigh`, (n,), are points in the zone of railheads; only these can
+    be on rails. `band`, (m,), are the numbers of all points of the square in this zone, `band_place`, (m, 3), their
+    places, and `stands_for`, (m,), the thinned point of their cube.
     """
 
     number: np.ndarray
@@ -80,16 +95,11 @@ class Thinned:
 
 @dataclass(frozen=True)
 class Block:
-    """Points that go through the network together.
+    """Points that go through the network together, with the column and row of the block in the square.
 
-    Attributes
-    ----------
-    number : (n,) int array
-        Numbers among the thinned points, in the order in which layers drop them, the last ones first.
-    core : (n,) bool array
-        Points in the middle of the block that can be on rails; those of all blocks of a square cover it once.
-    key : tuple of int
-        Column and row in the square.
+    `number`, (n,), are their numbers among the thinned points, in the order in which layers drop them, the last ones
+    first. `core`, (n,), are the points in the middle of the block that can be on rails; those of all blocks of a square
+    cover it once.
     """
 
     number: np.ndarray
@@ -98,13 +108,7 @@ class Block:
 
 
 def thin(xyz: np.ndarray) -> Thinned:
-    """Find the heights above the bed and thin the points.
-
-    Parameters
-    ----------
-    xyz : (n, 3) array
-        See `classify.square.classify_square`.
-    """
+    """Find the heights above the bed and thin the points, (n, 3) as in `classify.square.classify_square`."""
     bed, height, z = Bed.under(xyz)
     used = np.flatnonzero((height >= LEAST_M) & (height <= HIGH_M))
     place = np.column_stack([xyz[used, :2], z[used], height[used]]).astype(np.float32)
@@ -132,13 +136,7 @@ def _one_of_each(place: np.ndarray, side_m: float) -> tuple[np.ndarray, np.ndarr
 
 
 def cut(thinned: Thinned, side_m: float) -> list[Block]:
-    """Cut a square into blocks; places without a point in the zone of railheads are left out.
-
-    Parameters
-    ----------
-    side_m : float
-        Side of the square.
-    """
+    """Cut a square of `side_m` into blocks; places without a point in the zone of railheads are left out."""
     core_m = core_side(side_m)
     margin_m = min((BLOCK_M - core_m) / 2, core_m / 2 - 1e-6)
     inside = np.all((thinned.place[:, :2] >= 0) & (thinned.place[:, :2] < side_m), axis=1)
@@ -174,19 +172,12 @@ def centred(place: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class Layer:
+class PointLayer:
     """The points of a layer, those of all blocks behind each other.
 
-    Attributes
-    ----------
-    position : (n, 3) float32 array
-        Metres from the middle of the block.
-    near : (n, NEIGHBOURS) int64 array
-        Numbers of the nearest points of the same block. A block with fewer repeats them.
-    kept : (m,) int64 array
-        Numbers of the points that the next layer has.
-    nearest : (n,) int64 array
-        For each point, the nearest one of the next layer: its number there.
+    `position`, (n, 3) float32, is in metres from the middle of the block. `near`, (n, NEIGHBOURS), are the numbers of
+    the nearest points of the same block; a block with fewer repeats them. `kept`, (m,), are the numbers of the points
+    that the next layer has, and `nearest`, (n,), is the number there of the nearest one for each point.
     """
 
     position: np.ndarray
@@ -195,7 +186,7 @@ class Layer:
     nearest: np.ndarray
 
 
-def build(blocks: Sequence[np.ndarray]) -> list[Layer]:
+def build(blocks: Sequence[np.ndarray]) -> list[PointLayer]:
     """Find the neighbours of the points of blocks, (n, 3) each, on all layers."""
     layers = []
     for _ in range(LAYERS):
@@ -203,7 +194,7 @@ def build(blocks: Sequence[np.ndarray]) -> list[Layer]:
         starts = np.cumsum([0, *(len(part.position) for part in parts)])
         next_starts = np.cumsum([0, *(len(part.kept) for part in parts)])
         layers.append(
-            Layer(
+            PointLayer(
                 np.concatenate([part.position for part in parts]),
                 np.concatenate([part.near + start for part, start in zip(parts, starts)]),
                 np.concatenate([part.kept + start for part, start in zip(parts, starts)]),
@@ -214,11 +205,111 @@ def build(blocks: Sequence[np.ndarray]) -> list[Layer]:
     return layers
 
 
-def _layer(position: np.ndarray) -> Layer:
+def _layer(position: np.ndarray) -> PointLayer:
     """Find the neighbours within one block."""
     count = len(position)
     near = cKDTree(position).query(position, k=np.arange(1, min(NEIGHBOURS, count) + 1))[1]
     near = np.resize(near.T, (NEIGHBOURS, count)).T if count < NEIGHBOURS else near
     kept = np.arange(-(-count // RATIO))
     nearest = cKDTree(position[kept]).query(position)[1]
-    return Layer(position, near.astype(np.int64), kept, nearest.astype(np.int64))
+    return PointLayer(position, near.astype(np.int64), kept, nearest.astype(np.int64))
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a training is given, besides the cloud: classes of the rail points, and the device, AUTO, CPU or CUDA.
+
+    Each block with rails is learned from in every epoch; `start` has weights to start from.
+    """
+
+    rail_classes: tuple[int, ...]
+    epochs: int
+    seed: int
+    device: str
+    start: Path | None = None
+
+
+@dataclass(frozen=True)
+class Examples:
+    """Labelled blocks in a folder, and their index, an (n,) array of ENTRY."""
+
+    folder: Path
+    index: np.ndarray
+
+    @classmethod
+    def load(cls, folder: Path) -> Examples:
+        """Read the index of blocks that `save_index` has completed; ValueError if a file is missing or damaged."""
+        if (folder / CHECKS).read_bytes() != _checks(folder):
+            raise ValueError(f"{folder} is damaged")
+        return cls(folder, np.load(folder / INDEX))
+
+    def block(self, number: int) -> np.ndarray:
+        """Read a block, (n,) array of POINT."""
+        entry = self.index[number]
+        points = np.load(_square_file(self.folder, int(entry["file"])), mmap_mode="r")
+        return np.array(points[entry["start"] : entry["start"] + entry["count"]])
+
+    def validation(self, seed: int) -> np.ndarray:
+        """Choose the blocks that are kept back, (n,) bool; raise ParameterError if no two areas have rails."""
+        areas, area = np.unique(self.index["area"], axis=0, return_inverse=True)
+        has_rail = np.bincount(area.ravel(), self.index["rail"]) > 0
+        if has_rail.sum() < 2:
+            raise ParameterError(
+                "The labelled rails all lie in one place of 20 m: give a longer labelled cloud, so that a part can be "
+                "kept back for validation."
+            )
+        kept_back = np.zeros(len(areas), dtype=bool)
+        rng = np.random.RandomState(seed)
+        for group in (np.flatnonzero(has_rail), np.flatnonzero(~has_rail)):
+            count = max(round(VALIDATION_SHARE * len(group)), 1)
+            kept_back[rng.permutation(group)[:count]] = True
+        return kept_back[area.ravel()]
+
+
+def write_square(
+    folder: Path, file: int, key: tuple[int, int], side_m: float, xyz: np.ndarray, rail: np.ndarray, tile: np.ndarray
+) -> np.ndarray:
+    """Write the blocks of a square, given the number of its file, and its column and row; return (k,) of ENTRY.
+
+    Points are (n, 3) as in `classify.square.classify_square`, with their label and the number of their tile of the
+    cloud, (n,) each.
+    """
+    thinned = thin(xyz)
+    labels, count = rail[thinned.band], len(thinned.number)
+    rails = np.bincount(thinned.stands_for[labels], minlength=count)
+    others = np.bincount(thinned.stands_for[~labels], minlength=count)
+    rail, tile = rail[thinned.number], tile[thinned.number]
+    blocks = cut(thinned, side_m)
+    entries = np.zeros(len(blocks), ENTRY)
+    parts = [np.empty(0, POINT)]
+    start = 0
+    for entry, block in zip(entries, blocks):
+        points = np.empty(len(block.number), POINT)
+        points["place"] = centred(thinned.place[block.number])
+        points["rail"], points["core"] = rail[block.number], block.core
+        points["rails"], points["others"] = rails[block.number], others[block.number]
+        middle = (np.array(block.key) + 0.5) * core_side(side_m) / side_m
+        entry["area"] = np.multiply(key, AREAS) + np.floor(AREAS * middle).astype(np.int64)
+        entry["tile"] = np.bincount(tile[block.number]).argmax()
+        entry["file"], entry["start"], entry["count"] = file, start, len(points)
+        entry["rail"] = (points["rail"] & points["core"]).sum()
+        parts.append(points)
+        start += len(points)
+    np.save(_square_file(folder, file), np.concatenate(parts))
+    return entries
+
+
+def save_index(folder: Path, index: np.ndarray) -> None:
+    """Write the index of blocks, (n,) of ENTRY, and that all files are complete."""
+    np.save(folder / INDEX, index)
+    (folder / CHECKS).write_bytes(_checks(folder))
+
+
+def _checks(folder: Path) -> bytes:
+    """Return the checksums of the files of blocks and of their index."""
+    files = sorted(folder.glob(f"*{Path(INDEX).suffix}"))
+    return json.dumps({file.name: zlib.crc32(file.read_bytes()) for file in files}).encode()
+
+
+def _square_file(folder: Path, file: int) -> Path:
+    return folder / f"{file}.npy"

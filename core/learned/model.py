@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import ModelError, ParameterError
-from ..frpdf.models import FOLDER
-from ..frpdf.weights import load_arrays, save_arrays
+from ..frpdf.models import FOLDER, load_arrays, save_arrays
 from ..kernels import device_of, one_thread, pytorch
 from ..parameters import LEARNED
 from ..progress import SILENT, Progress
@@ -50,10 +49,7 @@ def save(path: Path, network: RandLaNet) -> None:
 def load(path: Path) -> RandLaNet:
     """Make a network with the weights of a file, on the CPU.
 
-    Raises
-    ------
-    ModelError
-        PyTorch is missing, or the file is missing, is damaged or holds something else.
+    Raises ModelError if PyTorch is missing, or the file is missing, is damaged or holds something else.
     """
     check_torch("METHOD LEARNED")
     from ..frpdf.network import set_weights, weights_of
@@ -80,17 +76,7 @@ def load(path: Path) -> RandLaNet:
 
 
 class Classifier:
-    """A trained network on its device.
-
-    Parameters
-    ----------
-    device : {"AUTO", "CPU", "CUDA"}
-
-    Raises
-    ------
-    ModelError
-        There is no CUDA device.
-    """
+    """A trained network on its device, AUTO, CPU or CUDA; ModelError if there is no CUDA device."""
 
     def __init__(self, network: RandLaNet, device: str = "AUTO") -> None:
         self.device = device_of(device)
@@ -134,12 +120,7 @@ class Classifier:
 def weights_for(method: str, weights: Path | None) -> Path | None:
     """Return the weights that one of `parameters.METHODS` uses, after a check that they can be; None for geometry.
 
-    Raises
-    ------
-    ParameterError
-        The method and the weights contradict each other.
-    ModelError
-        See `load`.
+    Raises ParameterError if the method and the weights contradict each other.
     """
     if method != LEARNED:
         if weights is not None:

@@ -1,7 +1,7 @@
 """RandLA-Net in PyTorch: Hu et al. (2020), "RandLA-Net: Efficient semantic segmentation of large-scale point clouds".
 
 Blocks have different numbers of points. They lie behind each other in one array of points, and the neighbours' numbers
-of `blocks.Layer` keep them apart; there is no padding.
+of `blocks.PointLayer` keep them apart; there is no padding.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from .blocks import LAYERS, Layer
+from .blocks import LAYERS, PointLayer
 
 FEATURES = 4
 """Of a point: its position in the block and its height above the bed."""
@@ -36,7 +36,7 @@ SCALE = (0.5, 0.5, 5.0, 5.0)
 
 @dataclass(frozen=True)
 class Tensors:
-    """A `blocks.Layer` on the device."""
+    """A `blocks.PointLayer` on the device."""
 
     position: Tensor
     near: Tensor
@@ -44,7 +44,7 @@ class Tensors:
     nearest: Tensor
 
     @classmethod
-    def of(cls, layer: Layer, device: str) -> Tensors:
+    def of(cls, layer: PointLayer, device: str) -> Tensors:
         """Move a layer to the device."""
         arrays = (layer.position, layer.near, layer.kept, layer.nearest)
         return cls(*(torch.from_numpy(array).to(device) for array in arrays))

@@ -22,7 +22,7 @@ from torch.nn import functional
 from ..errors import Cancelled, ModelError, ParameterError
 from ..kernels import device_of
 from ..progress import SILENT, Progress
-from .examples import Examples
+from .blocks import Examples
 from .model import in_groups, inputs, load
 from .network import RandLaNet, parameter_count
 
@@ -65,15 +65,10 @@ CHECKPOINT = "checkpoint.pt"
 
 
 @dataclass(frozen=True)
-class Settings:
-    """What determines the weights, besides the blocks.
+class TrainingSettings:
+    """What determines the weights, besides the blocks: each block with rails is learned from in every epoch.
 
-    Attributes
-    ----------
-    epochs : int
-        How many times each block with rails is learned from.
-    start : Path, optional
-        Weights to start from; None means random ones.
+    `start` has weights to start from; None means random ones.
     """
 
     epochs: int
@@ -82,24 +77,18 @@ class Settings:
 
 
 @dataclass(frozen=True)
-class Figures:
-    """Labels compared with the truth.
-
-    Attributes
-    ----------
-    right, missed, wrong : int
-        Rail points that were found and that were not, and others that were taken for rail.
-    """
+class LabelFigures:
+    """Labels compared with the truth: rail points found and missed, and other points that were taken for rail."""
 
     right: int = 0
     missed: int = 0
     wrong: int = 0
 
-    def __add__(self, other: Figures) -> Figures:
-        return Figures(self.right + other.right, self.missed + other.missed, self.wrong + other.wrong)
+    def __add__(self, other: LabelFigures) -> LabelFigures:
+        return LabelFigures(self.right + other.right, self.missed + other.missed, self.wrong + other.wrong)
 
     @classmethod
-    def of(cls, found: np.ndarray, points: np.ndarray) -> Figures:
+    def of(cls, found: np.ndarray, points: np.ndarray) -> LabelFigures:
         """Count what thinned points, (n,) of `examples.POINT`, stand for; those found, (n,) bool."""
         rails, others = points["rails"], points["others"]
         return cls(int(rails[found].sum()), int(rails[~found].sum()), int(others[found].sum()))
@@ -126,46 +115,28 @@ def _share(part: int, whole: int) -> float:
 
 @dataclass(frozen=True)
 class Check:
-    """The state of a training at a step.
-
-    Attributes
-    ----------
-    step : int
-        Steps done.
-    loss : float
-        Mean loss of the steps since the last check.
-    figures : Figures
-        Of blocks kept back.
-    """
+    """The state of a training after `step` steps: mean loss since the last check, and figures of blocks kept back."""
 
     step: int
     loss: float
-    figures: Figures
+    figures: LabelFigures
 
 
 @dataclass(frozen=True)
 class Trained:
-    """The result of a training.
-
-    Attributes
-    ----------
-    by_tile : dict of int to Figures
-        Of the blocks kept back, by tile of the cloud.
-    blocks, kept_back : int
-        Blocks learned from, and kept back.
-    """
+    """The result of a training: blocks learned from, blocks kept back, and their figures by tile of the cloud."""
 
     network: RandLaNet
     checks: tuple[Check, ...]
-    by_tile: dict[int, Figures]
+    by_tile: dict[int, LabelFigures]
     blocks: int
     kept_back: int
     steps: int
 
     @property
-    def total(self) -> Figures:
+    def total(self) -> LabelFigures:
         """Figures of all blocks kept back."""
-        return sum(self.by_tile.values(), Figures())
+        return sum(self.by_tile.values(), LabelFigures())
 
     @property
     def parameters(self) -> int:
@@ -174,25 +145,13 @@ class Trained:
 
 
 def train(
-    examples: Examples, settings: Settings, folder: Path, device: str = "AUTO", progress: Progress = SILENT
+    examples: Examples, settings: TrainingSettings, folder: Path, device: str = "AUTO", progress: Progress = SILENT
 ) -> Trained:
-    """Train from the beginning, or from the checkpoint in a folder.
+    """Train from the beginning, or from the checkpoint in a folder, on the device AUTO, CPU or CUDA.
 
-    Parameters
-    ----------
-    folder : Path
-        For the checkpoint.
-    device : {"AUTO", "CPU", "CUDA"}
-    progress : Progress
-        Cancelled, the training leaves a checkpoint.
-
-    Raises
-    ------
-    ParameterError
-        The labelled rails lie in one place, or the checkpoint belongs to another training.
-    ModelError
-        There is no CUDA device, or it has too little memory; the weights to start from are missing or something else.
-    Cancelled
+    Cancelled, the training leaves a checkpoint. Raises ParameterError if the labelled rails lie in one place, or the
+    checkpoint belongs to another training; ModelError if there is no CUDA device, it has too little memory, or the
+    weights to start from are missing or something else.
     """
     kept_back = examples.validation(settings.seed)
     run = _Run(examples, settings, np.flatnonzero(~kept_back), np.flatnonzero(kept_back), folder, device_of(device))
@@ -227,7 +186,7 @@ class _Run:
     def __init__(
         self,
         examples: Examples,
-        settings: Settings,
+        settings: TrainingSettings,
         learned: np.ndarray,
         kept_back: np.ndarray,
         folder: Path,
@@ -270,7 +229,9 @@ class _Run:
 
     def _check(self, progress: Progress) -> None:
         chosen = self.kept_back[:: math.ceil(len(self.kept_back) / CHECK_BLOCKS)]
-        figures = sum((Figures.of(logits > 0, core) for _, logits, core in self._evaluated(chosen)), Figures())
+        figures = sum(
+            (LabelFigures.of(logits > 0, core) for _, logits, core in self._evaluated(chosen)), LabelFigures()
+        )
         self.checks.append(Check(self.step, float(np.mean(self.losses)), figures))
         self.losses.clear()
         progress.info(
@@ -344,12 +305,12 @@ class _Run:
         with torch.no_grad():
             self.network.head[-1].bias -= best
 
-    def evaluated_by_tile(self) -> dict[int, Figures]:
+    def evaluated_by_tile(self) -> dict[int, LabelFigures]:
         """Compare the labels of the blocks kept back with the truth, by tile."""
-        by_tile: dict[int, Figures] = {}
+        by_tile: dict[int, LabelFigures] = {}
         for number, logits, core in self._evaluated(self.kept_back):
             tile = int(self.examples.index["tile"][number])
-            by_tile[tile] = by_tile.get(tile, Figures()) + Figures.of(logits > 0, core)
+            by_tile[tile] = by_tile.get(tile, LabelFigures()) + LabelFigures.of(logits > 0, core)
         return dict(sorted(by_tile.items()))
 
     def save(self) -> None:
@@ -388,7 +349,7 @@ class _Run:
         self.network.load_state_dict(state["network"])
         self.optimizer.load_state_dict(state["optimizer"])
         self.step, self.losses = state["step"], list(state["losses"])
-        self.checks = [Check(int(step), loss, Figures(*map(int, rest))) for step, loss, *rest in state["checks"]]
+        self.checks = [Check(int(step), loss, LabelFigures(*map(int, rest))) for step, loss, *rest in state["checks"]]
 
     def _identity(self) -> list[int]:
         """Return what must be the same in a training that continues."""

@@ -70,15 +70,10 @@ STEADY_TRANSITION_M = 500.0
 class Bridge:
     """A curve between two line ends.
 
-    Attributes
-    ----------
-    cost : float
-        Length in metres, times 1 to 3 depending on misfit and curvature.
-    cuts_m : tuple of float
-        Lengths to remove from the first and the second line: the parts at their ends that are off the curve, as where
-        weeds or other rails have drawn the line aside.
-    points : (n, 2) array
-        Points every `STEP_M` from the first end to the second, once these are cut; both ends excluded.
+    `cost` is its length in metres, times 1 to 3 depending on misfit and curvature. `cuts_m` are lengths to remove from
+    the first and the second line: the parts at their ends that are off the curve, as where weeds or other rails have
+    drawn the line aside. `points`, (n, 2), are every `STEP_M` from the first end to the second, once these are cut;
+    both ends excluded.
     """
 
     cost: float
@@ -93,26 +88,14 @@ def bridge(
     misfit_m: float = MISFIT_M,
     transition_m: float = TRANSITION_M,
 ) -> Bridge | None:
-    """Fit one smooth curve to the ends of two lines and return the part between them.
+    """Fit one smooth curve to the ends of two lines, (n, 2) from the end inward, and return the part between them.
 
     The curve is a cubic over the straight line across the gap, with the curvature of rails as prior. A connection to a
-    neighbouring rail is refused because it needs two opposite bends.
+    neighbouring rail is refused because it needs two opposite bends. None if the curve misses either line by a median
+    of more than `misfit_m`, bends more than a rail, or would have to turn back along a line.
 
-    Parameters
-    ----------
-    one, other : (n, 2) arrays
-        Both lines, from the end to be connected inward.
-    held : bool
-        Whether the first line must not be cut.
-    misfit_m : float
-        Largest median distance of either line from the curve.
-    transition_m : float
-        Shortest length in which the curvature may rise from 0 to 1 / `MIN_RADIUS_M`.
-
-    Returns
-    -------
-    Bridge or None
-        None if the curve misses either line, bends more than a rail, or would have to turn back along a line.
+    The first line is not cut if it is `held`. `transition_m` is the shortest length in which the curvature may rise
+    from 0 to 1 / `MIN_RADIUS_M`.
     """
     before, after = even_points(one, FIT_M)[::-1], even_points(other, FIT_M)
     origin, axes = _frame(before, after)
@@ -177,12 +160,7 @@ ARC, STRAIGHT = 2, 1
 class PartingLaw:
     """Distance between two axes over the way along one of them: (slope * way + root)^power, or 0 before they touch.
 
-    Attributes
-    ----------
-    slope, root : float
-        Of the straight line that the power-th root of the distance follows.
-    power : int
-        `ARC` or `STRAIGHT`.
+    The power, `ARC` or `STRAIGHT`, is that of the distance whose root follows a straight line.
     """
 
     slope: float

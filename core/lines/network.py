@@ -65,19 +65,11 @@ class LineNetwork:
         return bool(self._passing(number, first, last).any())
 
     def with_end(self, end: int, vertices: np.ndarray, replaced: int, at: tuple[int, int] | None = None) -> LineNetwork:
-        """Give a line a new end with a node of its own; passes at replaced vertices are dropped, others stay in place.
+        """Give line end `end` other `vertices`, (n, 2) from the end inward, for the `replaced` ones next to it.
 
-        Parameters
-        ----------
-        end : int
-            Line end to edit.
-        vertices : (n, 2) array
-            New vertices from the end inward.
-        replaced : int
-            Number of vertices next to the end that the new ones replace.
-        at : tuple of int, optional
-            Line and vertex in which the edited line is to end; the vertex is put before the new ones. Without it the
-            first new vertex is a free end.
+        The end has a node of its own; passes at replaced vertices are dropped, others stay in place. With `at`, a line
+        and a vertex, the edited line ends there: the vertex is put before the new ones; otherwise the first of these is
+        a free end.
         """
         start, passes = vertices, self.passes
         if at is not None:
@@ -129,12 +121,8 @@ class LineNetwork:
     def weld(self, partner: Mapping[int, int], bridges: Mapping[int, np.ndarray] | None = None) -> LineNetwork:
         """Join lines that continue each other into one.
 
-        Parameters
-        ----------
-        partner : mapping of end to end
-            The line end in which each end continues, in both directions. Ends that share a node are joined in it.
-        bridges : mapping of end to (n, 2) array, optional
-            Points from an end to its partner, for ends that are apart, in both directions.
+        `partner` has the line end in which each end continues, in both directions; ends that share a node are joined in
+        it. `bridges` has the points, (n, 2), from an end to its partner for ends that are apart, in both directions.
         """
         bridges = bridges or {}
         lines: list[np.ndarray] = []
@@ -169,16 +157,9 @@ class LineNetwork:
     def bridged(
         self, joins: Mapping[tuple[int, int], Bridge], cuts_m: Mapping[int, float], dropped: Collection[int] = ()
     ) -> LineNetwork:
-        """Join pairs of line ends by bridges.
+        """Join pairs of line ends by bridges, each from the first end to the second, and leave out the `dropped` lines.
 
-        Parameters
-        ----------
-        joins : mapping of (end, end) to Bridge
-            Each from the first end to the second.
-        cuts_m : mapping of end to float
-            Lengths cut off before the bridges were found; an end that is not joined becomes free.
-        dropped : collection of int
-            Lines to leave out.
+        `cuts_m` are the lengths cut off ends before the bridges were found; an end that is not joined becomes free.
         """
         cuts_m, partner, points = dict(cuts_m), {}, {}
         keep = ~np.isin(np.arange(len(self.lines)), list(dropped))

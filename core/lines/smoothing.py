@@ -38,22 +38,10 @@ _MIN_LENGTH_SIGMAS = 1e-2
 
 
 def local_fit(t: np.ndarray, values: np.ndarray, stations: np.ndarray, sigma: float) -> np.ndarray:
-    """Fit a quadratic around each station and evaluate it there.
+    """Fit a quadratic around each station, (m,) within t[0] and t[-1], and evaluate it there: (m, d).
 
-    Parameters
-    ----------
-    t : (n,) array
-        Position along the line, increasing; of equal positions only one counts.
-    values : (n, d) array
-        Linear between the positions; nothing is assumed beyond the ends.
-    stations : (m,) array
-        Within t[0] and t[-1], in any order.
-    sigma : float
-        Length of the kernel exp(-|u| / sigma), in the unit of t.
-
-    Returns
-    -------
-    (m, d) array
+    `values`, (n, d), are linear between the positions `t`, which increase; of equal ones only one counts, and nothing
+    is assumed beyond the ends. `sigma` is the length of the kernel exp(-|u| / sigma), in the unit of t.
     """
     centre = values.mean(axis=0)
     if len(t) < 2 or t[-1] - t[0] < _MIN_LENGTH_SIGMAS * sigma:
@@ -201,20 +189,9 @@ def smooth_line(
 def smooth_profile(t: np.ndarray, z: np.ndarray, sigma_m: float, stations: np.ndarray) -> np.ndarray:
     """Smooth heights over the distance along a line; points weigh by the distance between them, not by their number.
 
-    The ends are free. Where points are more than `GAP_SIGMAS` sigma apart, each side is smoothed on its own and the
-    profile is straight in between. Beyond its ends it keeps the last height.
-
-    Parameters
-    ----------
-    t, z : (n,) arrays
-        Distance along the line and height of points in any order, at least one.
-    sigma_m : float
-    stations : (m,) array
-        Distances at which the height is wanted.
-
-    Returns
-    -------
-    (m,) array
+    Points are given by distance and height, (n,), in any order, and the heights at `stations`, (m,), are returned. The
+    ends are free. Where points are more than `GAP_SIGMAS` sigma apart, each side is smoothed on its own and the profile
+    is straight in between. Beyond its ends it keeps the last height.
     """
     t, z = _averaged(np.asarray(t, dtype=float), np.asarray(z, dtype=float))
     stations = np.asarray(stations, dtype=float)
@@ -245,19 +222,8 @@ def smooth_network(network: LineNetwork, sigma_m: float, progress: Progress = SI
     """Smooth all lines of a network; lines that meet in a node still meet in it, and free ends stay in place.
 
     Each line is smoothed on its own, with fixed ends. A node moves to the mean of the places that the lines passing it
-    give it, and each line is bent to its moved nodes by a correction that fades within a few sigma.
-
-    Parameters
-    ----------
-    network : LineNetwork
-    sigma_m : float
-        Length of the kernel of PAEK.
-    progress : Progress
-
-    Returns
-    -------
-    LineNetwork
-        Lines with a vertex at each pass, and vertices at most an eighth of sigma apart.
+    give it, and each line is bent to its moved nodes by a correction that fades within a few sigma, the length of the
+    kernel of PAEK. The lines have a vertex at each pass, and vertices at most an eighth of sigma apart.
     """
     along = [Polyline(line).t for line in network.lines]
     anchor_line = np.concatenate([np.arange(2 * len(along)) // 2, network.passes[:, 1]])

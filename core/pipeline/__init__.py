@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from .. import checks
-from ..checks.density import occupied_squares, plausible
 from ..checks.doubts import doubting_scatter, strip_courses
+from ..checks.points import occupied_squares, plausible
 from ..checks.standard import warn_of_spacing
 from ..clouds.points import RailPoints
 from ..errors import NoRailPointsError, NoTrackError, RailExtractError
@@ -26,8 +26,8 @@ from ..rails import Centerline, RailLine, RailNetwork, TrackGeometry
 from ..raster import RailRaster
 from ..run.loop import Runner
 from ..run.tasks import Context, Task
-from ..squares.pieces import SquareRails, rows_in_frame
 from ..squares.remeasuring import measure_rails
+from ..squares.seams import SquareRails, rows_in_frame
 from ..squares.steps import clean_square, engine_for, rails_of_square, square_side, whole_rails
 from ..tiles.grid import Key, MemorySource, PointSource, SortedPoints, Square, around, assembled
 from ..tracks.centerlines import tracks_of
@@ -58,8 +58,6 @@ def extract_rails(
     ----------
     points : sequence of RailPoints or PointSource
         From `points.read_rail_points` or `spool.spool`: one per class, all in one frame.
-    parameters : Parameters
-    progress : Progress
 
     Raises
     ------
@@ -96,29 +94,11 @@ def extract_files(
 ) -> RailNetwork:
     """Extract rails and centerlines from files of points, however large, with any runner.
 
-    Parameters
-    ----------
-    source : Source
-        `sources.Classified`, `Raw` or `Grown`, made from a request of `points.ask`.
-    folder : Path
-        Existing folder for the points of the squares, 24 bytes each. The caller removes it.
-    parameters : Parameters
-    runner : Runner
-        Whether errors of single files and squares end the run is for the runner to decide.
-    progress : Progress
+    The source is made from a request of `points.ask`. The caller removes the folder, which gets the points of the
+    squares, 24 bytes each. Whether errors of single files and squares end the run is for the runner to decide.
 
-    Raises
-    ------
-    CloudError
-        A file is damaged; if the runner tolerates that, all of them are.
-    NoRailPointsError
-        No point of the requested classes is in the files and the extent.
-    DiskError
-        The disk is full.
-    ModelError, Cancelled
-        See `extract_rails`.
-    RailExtractError
-        Every square failed.
+    Raises CloudError if a file is damaged (if the runner tolerates that, all of them are), NoRailPointsError if no
+    point of the requested classes is in the files and the extent, and RailExtractError if every square failed.
     """
     recording = Recording(progress)
     sorting, walking = recording.divide((source.run_time, DRAWING + PAIRING + MEASURING))

@@ -14,9 +14,9 @@ from ..checks.standard import warn_of_gauge, warn_of_raw
 from ..classify.settings import Settings
 from ..clouds.header import CloudHeader
 from ..clouds.points import AIRBORNE, Request, read_each
-from ..disk import writing
+from ..disk import scratch_folder, writing
 from ..errors import CloudError, NoRailPointsError, RailExtractError
-from ..grow.settings import GrowSettings
+from ..grow.heads import GrowSettings
 from ..labelling.finding import find_rail_points, report
 from ..labelling.growing import grow_points
 from ..parameters import Parameters
@@ -24,11 +24,10 @@ from ..progress import Progress
 from ..rails import SearchFigures
 from ..run.loop import Runner
 from ..run.tasks import Context
-from ..scratch import scratch_folder
 from ..squares.steps import square_side
 from ..standards import RAIL_CLASS
 from ..tiles.grid import SortedPoints
-from ..tiles.spool import Census, SpooledFile, gather, spool_file
+from ..tiles.store import Census, SpooledFile, gather, spool_file
 
 READING = 0.2
 """Run time of sorting rail points relative to that of the walk, for the progress."""

@@ -7,14 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..airborne.cross_sections import STATION_M
-from ..airborne.remarks import FLIGHT
-from ..airborne.survey import AirborneTrack, Survey
+from ..airborne.ridges import STATION_M
+from ..airborne.survey import FLIGHT, AirborneSurvey, AirborneTrack
 from ..checks.listing import OFF_RAIL_MM, Finding
 from ..progress import counted, metres, written
 from .markup import legend, made, page, section, table, verdict_box
-from .origin import stated
-from .plan import Course, draw_plan
+from .page import stated
+from .plots import MapTrack, draw_plan
 
 GOOD_SHARE, FAIR_SHARE = 0.95, 0.7
 """Shares of the guides' length that must be seen for a verdict of good, and of usable."""
@@ -28,7 +27,7 @@ KEYS = (("seen", {"class_": "fine"}), ("not seen", {"class_": UNSEEN}))
 OTHER = "a second track without a guide {:.1f} m to the {}: give it a guide, so that neither is taken for the other"
 
 
-def airborne_findings(survey: Survey) -> tuple[Finding, ...]:
+def airborne_findings(survey: AirborneSurvey) -> tuple[Finding, ...]:
     """Return the sections that are not seen and the tracks without a guide, the longest first."""
     found = [one for track in survey.tracks for one in (*_unseen(track), *_others(track))]
     found.sort(key=lambda one: -one.harm)
@@ -70,7 +69,7 @@ def _finding(track: AirborneTrack, run: np.ndarray, reason: str) -> Finding:
     )
 
 
-def airborne_summary(survey: Survey) -> list[str]:
+def airborne_summary(survey: AirborneSurvey) -> list[str]:
     """Return the verdict and what it rests on, in sentences for a log."""
     return [
         _verdict(survey)[1],
@@ -79,7 +78,7 @@ def airborne_summary(survey: Survey) -> list[str]:
     ]
 
 
-def _verdict(survey: Survey) -> tuple[str, str]:
+def _verdict(survey: AirborneSurvey) -> tuple[str, str]:
     """Return the CSS class and the words of the verdict."""
     share = survey.seen_m / survey.guides_m
     if not survey.lines:
@@ -91,16 +90,8 @@ def _verdict(survey: Survey) -> tuple[str, str]:
     return "good", f"Good: {100 * share:.0f} % of the guides' length is seen."
 
 
-def airborne_page(survey: Survey, source: str, facts: Mapping[str, str]) -> str:
-    """Return the report as a complete HTML document.
-
-    Parameters
-    ----------
-    source : str
-        Name of the cloud.
-    facts : mapping of str to str
-        Further facts to state, by name.
-    """
+def airborne_page(survey: AirborneSurvey, source: str, facts: Mapping[str, str]) -> str:
+    """Return the report as a complete HTML document, with the name of the cloud and further facts by name."""
     kind, words = _verdict(survey)
     return page(
         f"Rail Extract: {source}",
@@ -114,12 +105,12 @@ def airborne_page(survey: Survey, source: str, facts: Mapping[str, str]) -> str:
     )
 
 
-def _courses(survey: Survey) -> list[Course]:
+def _courses(survey: AirborneSurvey) -> list[MapTrack]:
     """Return the tracks for the map; where one is not seen, its guide is near."""
-    return [Course(str(one.guide_id), one.xyz, {UNSEEN: ~one.seen.astype(bool)}) for one in survey.tracks]
+    return [MapTrack(str(one.guide_id), one.xyz, {UNSEEN: ~one.seen.astype(bool)}) for one in survey.tracks]
 
 
-def _tracks(survey: Survey) -> str:
+def _tracks(survey: AirborneSurvey) -> str:
     headings = ("Guide", "Name", "Length", "Seen", "Standard error", "of the height", "Cant", "Tightest radius")
     return table(headings, map(_row, survey.tracks))
 
@@ -139,7 +130,7 @@ def _row(track: AirborneTrack) -> tuple[object, ...]:
     )
 
 
-def _places(survey: Survey) -> str:
+def _places(survey: AirborneSurvey) -> str:
     found = airborne_findings(survey)
     rows = ((one.finding, one.track_id or "", f"{one.from_m:,.0f} to {one.to_m:,.0f} m", one.reason) for one in found)
     return table(("Finding", "Line", "Along the guide", "Why"), rows, "scroll tall", "words")

@@ -12,14 +12,14 @@ from typing import Any
 
 import numpy as np
 
-from ..alignment.deviations import Deviations
 from ..alignment.elements import Alignment, CantElement, Element, PlanElement, VerticalElement
+from ..alignment.measured import Deviations
 from ..alignment.stations import StationRange, stations_of
 from ..checks.findings import largest, rms
 from ..progress import metres
 from .markup import figure, legend, made, page, section, table, tag, text, tiles
-from .origin import stated
-from .plots import LEFT, SPACE, TICKS_ACROSS, WIDTH, Curve, Frame, Panel, across, bottom_of, broken, round_up
+from .page import stated
+from .plots import LEFT, SPACE, STEP_M, TICKS_ACROSS, WIDTH, Curve, Frame, Panel, across, bottom_of, broken, round_up
 
 PROPOSAL = (
     "A fitted alignment is a proposal: the elements that the measured track most likely follows. It does not show what "
@@ -44,9 +44,6 @@ STRIP, LABEL = 22.0, 46.0
 HALF_CHORD_M, HALF_BASE_M = 10, 5
 """Distances between the three points whose circle gives the measured curvature, and from a place to the two points
 that give its gradient, metres: those of the track geometry."""
-
-STEP_M = 1.5
-"""Places further apart belong to different parts of a track: deviations are given by the metre."""
 
 ALIGNMENT_STYLE = """
 svg .frame { fill: none; stroke: var(--line); }
@@ -76,24 +73,10 @@ def build_alignment_page(
     fitted: bool,
     warnings: Sequence[str] = (),
 ) -> str:
-    """Return the report on alignments and the tracks beside them.
+    """Return the report on alignments and the tracks beside them, a complete HTML document.
 
-    Parameters
-    ----------
-    courses : sequence of (Alignment, Deviations)
-    source : str
-        Name of the measured tracks.
-    facts : mapping of str to str
-        Facts to state by name, besides date, version and coordinate system.
-    fitted : bool
-        Whether the alignments were fitted to these tracks.
-    warnings : sequence of str
-        What the user was warned of.
-
-    Returns
-    -------
-    str
-        A complete HTML document.
+    `source` names the measured tracks, `facts` are stated by name besides date, version and coordinate system, and
+    `warnings` are what the user was warned of. `fitted` says whether the alignments were fitted to these tracks.
     """
     stated_facts = {
         **stated(courses[0][0].frame.crs_wkt),

@@ -15,7 +15,7 @@ from ..progress import counted, metres, written
 from .clearance_pictures import RULES, cross_section, diagram
 from .clearance_remarks import cannot_be_judged
 from .markup import figure, made, note, page, section, table, tag, tiles, verdict_box
-from .origin import stated
+from .page import stated
 from .plots import Curve, Panel, broken, draw_panels
 
 NOTES = (

@@ -32,15 +32,7 @@ NOTES = (
 
 
 def build_comparison(found: TrackComparison, source: str, facts: Mapping[str, str]) -> str:
-    """Return the page about a comparison, a complete HTML document.
-
-    Parameters
-    ----------
-    source : str
-        Names of both surveys.
-    facts : mapping of str to str
-        Further facts to state, by name.
-    """
+    """Return the page about a comparison, a complete HTML document, with the names of both surveys and more facts."""
     return page(
         f"Comparison: {source}",
         "Comparison of tracks",

@@ -53,15 +53,7 @@ NOTE = (
 
 @dataclass(frozen=True)
 class Quantity:
-    """A measured quantity that has a limit.
-
-    Attributes
-    ----------
-    name : str
-        Connects its input with its rows in the page.
-    limit_mm : float or None
-        Limit of the run; None if there is none.
-    """
+    """A measured quantity that may have a limit in this run; `name` connects its input with its rows in the page."""
 
     name: str
     label: str

@@ -92,13 +92,9 @@ dd { margin: 0; overflow-wrap: anywhere; }
 def tag(name: str, *content: str, **attributes: object) -> str:
     """Return an element as markup.
 
-    Parameters
-    ----------
-    *content : str
-        Markup; escape plain text with `text`.
-    **attributes : object
-        Values by name. Write an underscore for a hyphen, and append one to names that Python reserves. Floats are
-        written with two decimals, and attributes that are None are left out.
+    Content is markup; escape plain text with `text`. In the names of attributes, write an underscore for a hyphen, and
+    append one to names that Python reserves. Floats are written with two decimals, and attributes that are None are
+    left out.
 
     Examples
     --------
@@ -121,14 +117,8 @@ def text(content: object) -> str:
 def page(title: str, heading: str, source: str, *content: str, style: str = "") -> str:
     """Return a complete HTML document that needs no network and no other file.
 
-    Parameters
-    ----------
-    title, heading, source : str
-        Plain texts: the title of the window, the heading, and the line below it.
-    *content : str
-        Markup.
-    style : str
-        Rules besides those of all pages.
+    Title of the window, heading and the line below it, `source`, are plain texts; the content is markup, and `style`
+    has rules besides those of all pages.
     """
     head = (
         '<meta charset="utf-8">',

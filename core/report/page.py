@@ -1,20 +1,29 @@
-"""The report as a single page of HTML that needs no network and no other file."""
+"""The report as a single page of HTML that needs no network and no other file, and the origin of its result.
+
+The origin is cloud, rails, parameters, and the command that repeats the run.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from datetime import datetime
+from pathlib import Path
 
 import numpy as np
 
+from .. import VERSION
 from ..checks.findings import DOUBTS, GAUGE_OFF_MM, UNSUPPORTED, Doubt, Findings, TrackFindings, examine, known, median
 from ..checks.listing import Finding, listed, verdict
+from ..clouds.crs import parse_crs
 from ..frame import LocalFrame
+from ..parameters import Parameters
 from ..progress import metres, written
 from ..rails import ENOUGH_CELLS_PER_M, RailNetwork, SearchFigures
+from ..standards import Gauge, RailStandard
 from .limits import limits_table
 from .markup import figure, legend, made, note, page, section, table, tag, text, tiles, verdict_box
-from .plan import Course, draw_plan
-from .track_plots import draw_profiles, draw_strips
+from .plots import MapTrack, draw_plan, draw_profiles, draw_strips
 
 CLASSES_ADVICE = (
     "Rail classes: choose the class of the rails; in a raw cloud, which has none, have the rail points found."
@@ -43,27 +52,20 @@ STRIP_NOTE = (
     "show a rail or one passes on to the next."
 )
 
+STATED_APART = ("gauge_m", "head_width_m", "other_gauges_m", "other_heads_m", "engine", "device", "keep_cleaned")
+"""Parameters that the report states elsewhere, or that change no line."""
+
+INTERFACE = {"passes": "iterations", "quality_step": "step"}
+"""Names of parameters in QGIS where they differ."""
+
 
 def build_page(
     network: RailNetwork, gauges_m: Sequence[float], source: str, facts: Mapping[str, str] | None = None
 ) -> str:
-    """Return the report on a network.
+    """Return the report on a network with the geometry of its tracks, a complete HTML document.
 
-    Parameters
-    ----------
-    network : RailNetwork
-        With the geometry of its tracks.
-    gauges_m : sequence of float
-        Gauges that tracks may have.
-    source : str
-        Name of the cloud.
-    facts : mapping of str to str
-        Further facts to state, such as parameters, by name.
-
-    Returns
-    -------
-    str
-        A complete HTML document.
+    Tracks may have the gauges `gauges_m`; `source` names the cloud, and `facts`, such as parameters, are stated by
+    name.
     """
     findings = examine(network, gauges_m)
     return page(
@@ -89,10 +91,10 @@ def _of_all(findings: Findings) -> list[str]:
     return [plan, _findings(findings), _tracks(findings), limits]
 
 
-def _courses(findings: Findings) -> list[Course]:
+def _courses(findings: Findings) -> list[MapTrack]:
     """Return the tracks for the map, the most severe doubts on top."""
     return [
-        Course(
+        MapTrack(
             str(track.line.track_id),
             track.geometry.xyz,
             {doubt.name: track.doubtful[doubt] for doubt in reversed(DOUBTS)},
@@ -284,3 +286,80 @@ def _profiles(track: TrackFindings, frame: LocalFrame) -> str:
     height_m = frame.to_crs(track.geometry.xyz)[:, 2] * frame.vertical_unit_m
     keys = _keys(band=f"gauge within {GAUGE_OFF_MM:g} mm of nominal")
     return section(f"Track {track.line.track_id}", draw_profiles(track, height_m), keys)
+
+
+@dataclass(frozen=True)
+class Origin:
+    """From what and how a result was computed; `command` repeats the run.
+
+    The parameters are None if the lines come from another run. The time is that of the report, in the time zone of this
+    computer.
+    """
+
+    paths: tuple[Path, ...]
+    standard: RailStandard
+    other_gauges: tuple[Gauge, ...]
+    command: str
+    parameters: Parameters | None = None
+    time: datetime = field(default_factory=datetime.now)
+
+    @property
+    def gauges_m(self) -> tuple[float, ...]:
+        """Gauges that tracks may have."""
+        return self.standard.gauge_m, *(gauge_m for gauge_m, _ in self.other_gauges)
+
+    def report(self, network: RailNetwork) -> str:
+        """Build the report on a network with its track geometry, an HTML document."""
+        first, *more = (path.resolve().name for path in self.paths)
+        source = f"{first} and {len(more)} more" if more else first
+        facts = {
+            **stated(network.frame.crs_wkt, self.time),
+            "Rail": self.standard.label,
+            "Gauge": ", ".join(f"{1000 * gauge_m:g} mm" for gauge_m in self.gauges_m),
+            "Railhead width": ", ".join(self._head_widths()),
+            "Parameters": _stated(self.parameters) if self.parameters else "",
+            "Command": self.command,
+        }
+        return build_page(network, self.gauges_m, source, facts)
+
+    def _head_widths(self) -> list[str]:
+        """Write the width of the railheads, and those of gauges where it differs."""
+        width_m = self.standard.head_width_m
+        others = [
+            f"{1000 * own_m:g} mm on {1000 * gauge_m:g} mm gauge"
+            for gauge_m, own_m in self.other_gauges
+            if own_m != width_m
+        ]
+        return [f"{1000 * width_m:g} mm", *others]
+
+
+def _stated(parameters: Parameters) -> str:
+    """Write parameters under their names in QGIS, with units."""
+    stated = []
+    for one in fields(Parameters):
+        value = getattr(parameters, one.name)
+        if one.name in STATED_APART or value is None:
+            continue
+        name, _, unit = one.name.rpartition("_")
+        named, unit = {"m": (name, " m"), "deg": (name, "°")}.get(unit, (one.name, ""))
+        text = value if isinstance(value, str) else f"{value:g}{unit}"
+        stated.append(f"{INTERFACE.get(named, named).upper()} {text}")
+    return ", ".join(stated)
+
+
+def stated(crs_wkt: str | None, time: datetime | None = None) -> dict[str, str]:
+    """Return what a report states in every case: the time, now unless another one is given, version and system."""
+    return {
+        "Date": f"{time or datetime.now():%Y-%m-%d %H:%M}",
+        "Version": f"Rail Extract {VERSION}",
+        "Coordinate system": _title(crs_wkt),
+    }
+
+
+def _title(crs_wkt: str | None) -> str:
+    """Code and name of a coordinate system, as QGIS shows them."""
+    if not crs_wkt:
+        return "none stated: metres"
+    crs = parse_crs(crs_wkt)
+    authority = crs.to_authority()
+    return f"{':'.join(authority)} - {crs.name}" if authority else crs.name

@@ -11,8 +11,8 @@ from .markup import made, note, page, section, table, verdict_box
 from .plots import Curve, Panel, draw_panels
 
 if TYPE_CHECKING:
-    from ..learned.examples import Plan
-    from ..learned.training import Figures, Trained
+    from ..learned.blocks import Plan
+    from ..learned.training import LabelFigures, Trained
     from ..standards import RailStandard
 
 GOOD_RECALL = 0.99
@@ -27,20 +27,7 @@ NOTE = (
 
 
 def build_card(trained: Trained, tiles: Sequence[str], facts: Mapping[str, str]) -> str:
-    """Return the card of a training.
-
-    Parameters
-    ----------
-    tiles : sequence of str
-        Names of the files of the cloud, by number.
-    facts : mapping of str to str
-        Further facts to state, such as settings, by name.
-
-    Returns
-    -------
-    str
-        A complete HTML document.
-    """
+    """Return the card of a training, a complete HTML document, with the names of the cloud's files and more facts."""
     total = trained.total
     rows = [_row(tiles[number], figures) for number, figures in trained.by_tile.items()]
     return page(
@@ -72,12 +59,12 @@ def facts_of(trained: Trained, plan: Plan, standard: RailStandard) -> dict[str, 
     }
 
 
-def _verdict(total: Figures) -> str:
+def _verdict(total: LabelFigures) -> str:
     words = f"Recall {total.recall:.3f}, precision {total.precision:.3f} on places that were kept back."
     return verdict_box("good" if total.recall >= GOOD_RECALL else "fair", words)
 
 
-def _row(name: str, figures: Figures) -> tuple[object, ...]:
+def _row(name: str, figures: LabelFigures) -> tuple[object, ...]:
     shares = (figures.recall, figures.precision, figures.f1)
     return (name, f"{figures.right + figures.missed:,}", *(f"{one:.3f}" if np.isfinite(one) else "" for one in shares))
 

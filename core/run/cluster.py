@@ -20,14 +20,13 @@ from distributed import Client, Future, LocalCluster
 from distributed import TimeoutError as NoAnswer
 from distributed.security import Security
 
+from ..disk import scratch_folder, sweep
 from ..errors import ParameterError, RailExtractError, WorkerError
 from ..kernels import ENVIRONMENT
 from ..progress import Progress
-from ..scratch import scratch_folder, sweep
 from .loop import Answer, Executor, Heard, next_of
 from .processes import worker_count
-from .tasks import Context, Once, Task
-from .version import CORE, version
+from .tasks import CORE, Context, Once, Task, version
 
 MAX_DEATHS = 10
 """Local workers that may die while they execute a task, for whatever reason, before the task is abandoned."""
@@ -79,10 +78,7 @@ def _deaf_to_interrupts() -> Iterator[None]:
 def running(scheduler: str, certificates: Certificates | None = None) -> Iterator[Client]:
     """Use a running scheduler that has workers, given its address, such as tls://10.0.0.1:8786.
 
-    Raises
-    ------
-    RailExtractError
-        There is no scheduler at this address, or the certificates can't be used.
+    Raises RailExtractError if there is no scheduler at this address, or the certificates can't be used.
     """
     security = None if certificates is None else certificates.security()
     try:

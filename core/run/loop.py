@@ -158,22 +158,10 @@ class Keeping(Protocol):
 class Runner:
     """Executes tasks, each as soon as its inputs are there, and reports as if they ran one after another.
 
-    Results, messages and errors come in the order of `turns`, so that nothing depends on the executor. A result is
-    released as soon as no further task takes it.
-
-    Parameters
-    ----------
-    executor : Executor, optional
-        By default this process.
-    keeping : Keeping, optional
-        What keeps results for later runs.
-    tolerant : bool
-        Whether a task that fails is recorded, and the others continue; otherwise the first error ends the run.
-
-    Attributes
-    ----------
-    failures : list of str
-        Sentences that say what is missing from the result.
+    Results, messages and errors come in the order of `turns`, so that nothing depends on the executor, by default this
+    process. A result is released as soon as no further task takes it; `keeping` keeps results for later runs. A
+    tolerant runner records a task that fails, in `failures`, which say what is missing from the result, and continues
+    with the others; otherwise the first error ends the run.
     """
 
     def __init__(

@@ -1,15 +1,20 @@
-"""Tasks: pieces of work that can run in any process."""
+"""Tasks, pieces of work that can run in any process, and the version by which computers see that they run the same."""
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 from ..progress import Progress
 
 READ_S = 1e-6
 """Run time per point that is read or written, compressed, in seconds; the weight of such tasks."""
+
+CORE = Path(__file__).resolve().parent.parent
 
 
 class Once:
@@ -60,7 +65,6 @@ class Task:
         What the task does, for error messages.
     function : callable
         Called with the arguments followed by a `Context`. A function of a module, so that other processes find it.
-    arguments : tuple
     needs : tuple of Name
         Tasks without whose results this one cannot run.
     uses : tuple of Name
@@ -83,3 +87,12 @@ class Task:
     def inputs(self) -> tuple[Hashable, ...]:
         """Every task whose result this one can take."""
         return (*self.needs, *self.uses)
+
+
+@lru_cache
+def version() -> str:
+    """Return the fingerprint of the code and of all weights."""
+    digest = hashlib.sha256()
+    for file in (*sorted(CORE.rglob("*.py")), *sorted((CORE.parent / "models").glob("*.npz"))):
+        digest.update(hashlib.sha256(file.read_bytes()).digest())
+    return digest.hexdigest()

@@ -18,17 +18,15 @@ from typing import Any
 
 import numpy as np
 
-from ..disk import writing
+from ..disk import discard, scratch_folder, sweep, writing
 from ..errors import RailExtractError
 from ..frame import LocalFrame
 from ..rails import RailLine, Support
 from ..raster import RailRaster
-from ..run.tasks import Context, Task
-from ..run.version import version
-from ..scratch import discard, scratch_folder, sweep
+from ..run.tasks import Context, Task, version
 from ..tiles.grid import Square
-from ..tiles.spool import SpooledPoints
-from .pieces import SquareRails
+from ..tiles.store import SpooledPoints
+from .seams import SquareRails
 
 KEPT = {one.__name__: one for one in (RailRaster, SquareRails, Square, LocalFrame, RailLine, Support)}
 """Classes of which results consist, besides numbers, texts, arrays, tuples and mappings."""
@@ -129,12 +127,7 @@ def can_store(result: Any) -> bool:
 
 
 def save(path: Path, result: RailRaster | SquareRails | tuple[RailLine, ...]) -> None:
-    """Write a result, in a temporary folder first: a full disk or a killed worker leaves no incomplete file.
-
-    Raises
-    ------
-    DiskError
-    """
+    """Write a result, in a temporary folder first: a full disk or a killed worker leaves no incomplete file."""
     arrays: list[bytes] = []
     text = json.dumps(_described(result, arrays), default=np.generic.item)
     with writing(path.parent), scratch_folder(path.parent) as scratch:
@@ -151,12 +144,7 @@ class DamagedError(RailExtractError):
 
 
 def load(stored: Stored) -> Any:
-    """Read what `save` wrote.
-
-    Raises
-    ------
-    DamagedError
-    """
+    """Read what `save` wrote; raise DamagedError if it was changed."""
     try:
         with np.load(stored.path, allow_pickle=False) as file:
             return _restored(json.loads(file["text"].tobytes()), BytesIO(file["arrays"].tobytes()))

@@ -13,10 +13,8 @@ from ..clouds.points import RailPoints
 from ..errors import ParameterError
 from ..frame import LocalFrame
 from ..frpdf.cleanup import MARGIN, clean, max_passes
-from ..frpdf.engine import Engine
-from ..frpdf.engines import make_engine
-from ..frpdf.models import choose
-from ..frpdf.weights import load_arrays
+from ..frpdf.engine import Engine, make_engine
+from ..frpdf.models import choose, load_arrays
 from ..heads.elevation import ElevationParameters, elevate, flat_rail, flat_rails, numbered
 from ..heads.head_points import judged, near_lines
 from ..heads.refinement import refine
@@ -33,8 +31,7 @@ from ..raster import TILE, RailRaster, cell_size, rasterize
 from ..tiles.grid import HALO_M, OVERLAP_M, Key, PointSource, Square, mosaic, own_tiles
 from ..tracks.parallels import widths_by_gauge
 from ..vectorize import vectorize
-from .pieces import SquareRails, trim
-from .seams import join
+from .seams import SquareRails, join, trim
 
 VECTORIZE, SMOOTH, REFINE, ELEVATE = 0.45, 0.05, 0.25, 0.25
 """Relative run times of the steps from a raster to lines, for the progress."""

@@ -33,14 +33,9 @@ Key = tuple[int, int]
 
 @dataclass(frozen=True)
 class Square:
-    """A square, or the whole plane if the cloud is small.
+    """A square, or the whole plane if the cloud is small; then `side_m` is infinite.
 
-    Attributes
-    ----------
-    frame : LocalFrame
-        Its origin is the south-western corner of the square; for the whole plane, the origin of the cloud.
-    side_m : float
-        Infinite for the whole plane.
+    The origin of the frame is the south-western corner of the square; for the whole plane, the origin of the cloud.
     """
 
     key: Key
@@ -101,16 +96,10 @@ class PointSource(Protocol):
 
 @dataclass(frozen=True)
 class SortedPoints:
-    """Rail points by class and square.
+    """Rail points by class and square, and the figures of the search if the points are from a raw cloud.
 
-    Attributes
-    ----------
-    search : SearchFigures or None
-        What was found, if the points are from a raw cloud.
-    only_pairs : bool
-        Whether nothing but its partner tells a rail from other ridges, where heads are blunt.
-    is_warned : bool
-        Whether the user has been warned of another gauge.
+    `only_pairs`: nothing but its partner tells a rail from other ridges, where heads are blunt. `is_warned`: the user
+    has been warned of another gauge.
     """
 
     classes: Sequence[PointSource]
@@ -155,10 +144,7 @@ class MemorySource:
 class Tiling:
     """A division of the plane into squares, from the zero of the coordinate system.
 
-    Attributes
-    ----------
-    margin_m : float
-        Distance, less than half a side, beyond the border of a square up to which points belong to it as well.
+    Points belong to a square up to `margin_m`, less than half a side, beyond its border as well.
     """
 
     side_m: float

@@ -1,32 +1,43 @@
 """The one store of points on disk: sorted into the squares of a tiling, so that memory holds those of one square.
 
-Each file of a cloud is read once, by a task that appends its points to files in a folder of its own.
+Each file of a cloud is read once, by a task that appends its points to files in a folder of its own. See docs/method.md
+section 7.1.
 """
 
 from __future__ import annotations
 
+import hashlib
+import json
+import os
 import uuid
+import zlib
 from collections import Counter
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from ..disk import writing
-from .grid import Key
+from ..clouds.on_heads import heads_of
+from ..clouds.passes import number_passes
+from ..clouds.points import RailPoints, Request, origin_steps
+from ..clouds.readers import CloudHeader
+from ..disk import discard, scratch_folder, writing
+from ..frame import LocalFrame
+from ..progress import SILENT, Progress
+from .grid import Key, Square, Tiling, around
+
+REPORT = "report.json"
+
+LAYOUT = 2
+"""Number of the layout of sorted points, so that those of an earlier version are read again."""
 
 
 @dataclass(frozen=True)
 class SortedFile:
-    """The points of one file of a cloud, sorted into squares.
+    """The points of one file of a cloud, sorted into a folder with one file per square, and their number by square.
 
-    Attributes
-    ----------
-    folder : str
-        Folder with one file for each square that has points, or points in its margin.
-    counts : mapping of Key to int
-        Points by square.
+    Squares with points in their margin only have a file, too.
     """
 
     folder: str
@@ -63,3 +74,249 @@ def read_stored(files: Iterable[str], dtype: np.dtype) -> np.ndarray:
     """Read the points of a square, (n,) array of their type."""
     parts = [np.empty(0, np.uint8), *(np.fromfile(file, np.uint8) for file in files if Path(file).exists())]
     return np.concatenate(parts).view(dtype)  # joining bytes takes a fifth of the time that joining fields does
+
+
+@dataclass(frozen=True)
+class SpooledFile:
+    """The sorted points of one file of the cloud, in a folder, and a report on them.
+
+    "classes" has, for each class code, the number of points by square, the checksum of each square's file, and the
+    smallest and largest x and y in units of the CRS. "census" has the number of all points by class, "steps", for each
+    axis, the number of points of the requested classes by `origin_steps`.
+    """
+
+    folder: str
+    report: dict
+
+
+@dataclass(frozen=True)
+class SpooledPoints:
+    """The points of one class on disk, a `PointSource`; `found` and `blunt` as in `RailPoints`.
+
+    `files` hold the points of each square, one for each mark (see `passes.marks_of`), with which its name ends;
+    `passes` has the number of the strip, a pass of the scanner, of each mark.
+    """
+
+    frame: LocalFrame
+    class_code: int
+    side_m: float
+    counts: Mapping[Key, int]
+    span_m: float
+    files: Mapping[Key, tuple[str, ...]]
+    passes: Mapping[int, int]
+    found: bool = False
+    blunt: bool | None = None
+
+    def near(self, square: Square, margin_m: float) -> RailPoints:
+        """See `PointSource`."""
+        keys = sorted(self.files) if square.is_whole_plane else around(square.key)
+        files = [file for key in keys for file in self.files.get(key, ())]
+        parts = [_read(file, square, margin_m) for file in files]
+        xyz = parts[0] if len(parts) == 1 else np.concatenate(parts or [np.empty((0, 3))])
+        strips = np.array([self.passes[_numbers(file)[-1]] for file in files], dtype=np.int32)
+        each = np.repeat(strips, [len(part) for part in parts]) if len(np.unique(strips)) > 1 else None
+        return heads_of(RailPoints(xyz, square.frame, self.class_code, each, self.found, self.blunt))
+
+    def judged(self, blunt: bool) -> SpooledPoints:
+        """See `PointSource`."""
+        return replace(self, blunt=blunt)
+
+    def part(self, square: Square) -> SpooledPoints:
+        """Keep only a square and its neighbours, so that less is sent to a worker."""
+        if square.is_whole_plane:
+            return self
+        keys = [key for key in around(square.key) if key in self.files]
+        files = {key: self.files[key] for key in keys}
+        marks = {_numbers(file)[-1] for own in files.values() for file in own}
+        passes = {mark: self.passes[mark] for mark in sorted(marks)}
+        return replace(self, counts={key: self.counts[key] for key in keys}, files=files, passes=passes)
+
+
+def _read(file: str, square: Square, margin_m: float) -> np.ndarray:
+    """Read the points of a file that are in a square or at most `margin_m` outside, (n, 3), in the frame of the square.
+
+    A single place may hold most of a cloud, so that each copy of its points counts.
+    """
+    xyz = square.frame.to_local(np.fromfile(file).reshape(-1, 3))
+    inside = square.holds(xyz, margin_m)
+    return xyz if inside.all() else xyz[inside]
+
+
+def spool(request: Request, side_m: float, folder: Path, progress: Progress = SILENT) -> tuple[SpooledPoints, ...]:
+    """Read a cloud once and sort its points into squares in a folder that the caller removes.
+
+    Returns one for each requested class that has points, in ascending order of code, all in one local frame. Raises
+    CloudError if a file is damaged, and NoRailPointsError if no point of the requested classes is within the extent.
+    """
+    shares = request.shares(progress)
+    found = [spool_file(request, header, side_m, folder, share) for header, share in zip(request.headers, shares)]
+    return gather(request, side_m, found)
+
+
+def spool_file(
+    request: Request, header: CloudHeader, side_m: float, folder: Path, progress: Progress = SILENT
+) -> SpooledFile:
+    """Sort the points of one file into squares, unless that has been done and nothing has changed since.
+
+    Two processes may sort the same file at the same time: each writes to its own folder, and the first to finish
+    provides the result.
+    """
+    mine = folder / _fingerprint(request, header, side_m)
+    if os.path.lexists(mine):
+        try:
+            return SpooledFile(str(mine), _checked_report(mine))
+        except ValueError:
+            progress.warning(f"The stored points of {header.path.name} are damaged: the file is read again.")
+            discard(mine)
+    with writing(folder), scratch_folder(folder) as scratch:
+        unfinished = scratch / mine.name
+        unfinished.mkdir()
+        found = _sort(request, header, side_m, unfinished, progress)
+        _name_first(unfinished, mine)
+    return SpooledFile(str(mine), found)
+
+
+def _sort(request: Request, header: CloudHeader, side_m: float, folder: Path, progress: Progress) -> dict:
+    """Write the points of a file to the files of their squares, and the report; returns the report."""
+    found = Census()
+    for xyz, codes, marks, census in request.read(header, progress):
+        found.census += census
+        with writing(folder.parent):
+            for code in np.unique(codes).tolist():
+                found.add(code, xyz[codes == code], marks[codes == code], request.zero, side_m, folder)
+    report = found.report()
+    text = json.dumps(report)
+    with writing(folder.parent):
+        (folder / REPORT).write_text(f"{_digest(text)}\n{text}", encoding="ascii")
+    return report
+
+
+def _checked_report(folder: Path) -> dict:
+    """Read the report of sorted points; `ValueError` unless all of them are still what was written."""
+    try:
+        digest, text = (folder / REPORT).read_text(encoding="ascii").split("\n")
+        if digest != _digest(text):
+            raise ValueError(REPORT)
+        report = json.loads(text)
+        for found in report["classes"].values():
+            for name, check in found["checks"].items():
+                if zlib.crc32((folder / name).read_bytes()) != check:
+                    raise ValueError(name)
+    except OSError as error:
+        raise ValueError(str(error)) from error
+    return report
+
+
+def _digest(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _name_first(folder: Path, name: Path) -> None:
+    """Rename a folder, unless another process has created one of that name in the meantime."""
+    try:
+        folder.rename(name)
+    except OSError:
+        if not name.exists():
+            raise
+
+
+def gather(request: Request, side_m: float, found: Sequence[SpooledFile]) -> tuple[SpooledPoints, ...]:
+    """Combine the sorted files of a cloud; see `spool`."""
+    codes = sorted({int(code) for file in found for code in file.report["classes"]})
+    if not codes:
+        raise request.explain_none(np.sum([file.report["census"] for file in found], axis=0))
+    steps: list[Counter[float]] = [Counter(), Counter(), Counter()]
+    for total, axis in zip(steps, range(3)):
+        for file in found:
+            total.update(dict(file.report["steps"][axis]))
+    frame = request.frame_at([tuple(np.array(sorted(one.items())).T) for one in steps])
+    rows = [
+        (mark, *key)
+        for file in found
+        for of_class in file.report["classes"].values()
+        for _, *key, mark in map(_numbers, of_class["squares"])
+    ]
+    marks, *places = np.array(rows).T
+    passes = number_passes(marks, np.column_stack(places))
+    return tuple(_source(code, found, frame, side_m, passes) for code in codes)
+
+
+class Census:
+    """Counts of the points written to disk, in JSON types."""
+
+    def __init__(self) -> None:
+        self.census = np.zeros(256, dtype=np.int64)
+        self._classes: dict[int, dict] = {}
+        self._steps: list[Counter[float]] = [Counter(), Counter(), Counter()]
+
+    def add(self, code: int, xyz: np.ndarray, marks: np.ndarray, zero: LocalFrame, side_m: float, folder: Path) -> None:
+        """Append points of one class, (n, 3) in units of the CRS, to the files of their squares and marks, (n,)."""
+        if not len(xyz):
+            return
+        new = {"squares": {}, "checks": {}, "low": [np.inf] * 2, "high": [-np.inf] * 2}
+        mine = self._classes.setdefault(code, new)
+        for mark in np.unique(marks).tolist():
+            own = xyz[marks == mark]
+            for key, numbers in Tiling(side_m).sort(zero.to_local(own)).items():
+                points = own[numbers]
+                name = append(folder, (code, *key, mark), points)
+                mine["checks"][name] = zlib.crc32(points.data, mine["checks"].get(name, 0))
+                mine["squares"][name] = mine["squares"].get(name, 0) + len(numbers)
+        mine["low"] = np.minimum(mine["low"], xyz[:, :2].min(axis=0)).tolist()
+        mine["high"] = np.maximum(mine["high"], xyz[:, :2].max(axis=0)).tolist()
+        for steps, column in zip(self._steps, origin_steps(xyz).T):
+            values, counts = np.unique(column, return_counts=True)
+            steps.update(dict(zip(values.tolist(), counts.tolist())))
+
+    def report(self) -> dict:
+        """Return `SpooledFile.report`."""
+        classes = {str(code): found for code, found in self._classes.items()}
+        return {
+            "classes": classes,
+            "census": self.census.tolist(),
+            "steps": [list(map(list, steps.items())) for steps in self._steps],
+        }
+
+
+def _numbers(file: str) -> list[int]:
+    """Return the numbers that name a file of points: class, both numbers of the square, and mark."""
+    return [int(part) for part in Path(file).name.split("_")]
+
+
+def _source(
+    code: int, found: Sequence[SpooledFile], frame: LocalFrame, side_m: float, passes: Mapping[int, int]
+) -> SpooledPoints:
+    """Combine the points of one class."""
+    counts: dict[Key, int] = {}
+    files: dict[Key, tuple[str, ...]] = {}
+    mine = [(file.folder, file.report["classes"][str(code)]) for file in found if str(code) in file.report["classes"]]
+    for folder, of_class in mine:
+        for name, count in of_class["squares"].items():
+            _, column, row, _ = _numbers(name)
+            key = (column, row)
+            counts[key] = counts.get(key, 0) + count
+            files[key] = (*files.get(key, ()), str(Path(folder) / name))
+    low = np.min([of_class["low"] for _, of_class in mine], axis=0)
+    high = np.max([of_class["high"] for _, of_class in mine], axis=0)
+    span_m = float((high - low).max() * frame.horizontal_unit_m)
+    return SpooledPoints(frame, code, side_m, counts, span_m, files, passes)
+
+
+def _fingerprint(request: Request, header: CloudHeader, side_m: float) -> str:
+    """Return a name that depends on the file and on everything that determines how its points are sorted."""
+    state = header.path.stat()
+    facts = (
+        LAYOUT,
+        str(header.path.resolve()),
+        state.st_size,
+        state.st_mtime_ns,
+        request.class_codes if request.merged else sorted(request.class_codes),
+        request.merged,
+        request.extent,
+        None if request.mask is None else hashlib.sha256(request.mask.edges.tobytes()).hexdigest(),
+        sorted(request.leave_out),
+        side_m,
+        request.zero.horizontal_unit_m,
+        request.zero.vertical_unit_m,
+    )
+    return hashlib.sha256(repr(facts).encode()).hexdigest()[:24]

@@ -34,14 +34,9 @@ MAX_HIDDEN_M = 30.0
 class _Ends:
     """Places from which tracks may continue.
 
-    Attributes
-    ----------
-    owner : (n,) int array
-        End of a section to which each place belongs: 2 k is the start of section k, and 2 k + 1 its end.
-    xy : (n, 2) array
-        Midway between the rails, or half their distance from the one that continues.
-    outward : (n, 2) array
-        Unit vectors pointing out of the section.
+    Place 2 k in `owner`, (n,), is the start of section k, and 2 k + 1 its end; `xy`, (n, 2), is midway between the
+    rails, or half their distance from the one that continues, and `outward`, (n, 2), holds unit vectors out of the
+    section.
     """
 
     owner: np.ndarray
@@ -75,14 +70,10 @@ class _Ends:
 
 
 @dataclass(frozen=True)
-class Chain:
+class TrackChain:
     """A track: its sections in order, all in the same direction.
 
-    Attributes
-    ----------
-    pairs : tuple of RailPair
-    behind_m, ahead_m : float
-        Length over which one rail alone may be followed back from the first section and on from the last.
+    One rail alone may be followed `behind_m` back from the first section, and `ahead_m` on from the last.
     """
 
     pairs: tuple[RailPair, ...]
@@ -97,20 +88,12 @@ def single_rail_limit(max_gap_m: float) -> float:
 
 def chain_pairs(
     rails: Sequence[RailLine], pairs: Sequence[RailPair], max_gap_m: float, tolerance_m: float = 0.05
-) -> tuple[Chain, ...]:
+) -> tuple[TrackChain, ...]:
     """Chain sections of track that continue each other.
 
     Either a rail leads from one to the next, or they point at each other across at most `max_gap_m` without any rail.
-    Of several continuations, one along both rails wins, then the straightest and nearest.
-
-    Parameters
-    ----------
-    rails : sequence of RailLine
-    pairs : sequence of RailPair
-    max_gap_m : float
-        Maximum length without any rail.
-    tolerance_m : float
-        Tolerance of the gauge.
+    Of several continuations, one along both rails wins, then the straightest and nearest. `tolerance_m` is that of the
+    gauge.
     """
     if not pairs:
         return ()
@@ -122,13 +105,13 @@ def chain_pairs(
         for end in (link.first, link.second):
             alone_m[end] = min(alone_m[end], max(link.length_m, 0.0))
     loose = [end for end in alone_m if end not in partner]
-    chains: list[Chain] = []
+    chains: list[TrackChain] = []
     done: set[int] = set()
     for start in loose + list(range(0, 2 * len(pairs), 2)):  # sections that no loose end leads to form rings
         row, last = _follow(pairs, partner, start, done)
         if row:
             behind, ahead = (alone_m[end] if end not in partner else 0.0 for end in (start, last))
-            chains.append(Chain(tuple(row), behind, ahead))
+            chains.append(TrackChain(tuple(row), behind, ahead))
     return tuple(chains)
 
 
@@ -230,16 +213,9 @@ def _along_and_beside(vectors: np.ndarray, directions: np.ndarray) -> tuple[np.n
 
 @dataclass(frozen=True)
 class RailAhead:
-    """A rail seen outwards from the end of a section.
+    """A rail in plan, seen outwards from the end of a section at chainage `end_m`.
 
-    Attributes
-    ----------
-    line : Polyline
-        The rail in plan.
-    end_m : float
-        Chainage of the end of the section.
-    sense : int
-        1 if chainages increase outwards, otherwise -1.
+    `sense` is 1 if chainages increase outwards, otherwise -1.
     """
 
     line: Polyline

@@ -25,14 +25,9 @@ TIE = 1e-9
 class Match:
     """A section of one polyline and the section of another that it matches.
 
-    Attributes
-    ----------
-    first, second : (k,) int arrays
-        Successive vertices; from one entry to the next, exactly one of the two advances by one.
-    length : float
-        Sum of the lengths of both sections.
-    penalty : float
-        Squared distance between vertices and their segments, integrated over the segments.
+    `first` and `second`, (k,), are successive vertices: from one entry to the next, exactly one of the two advances by
+    one. `length` is the sum of the lengths of both sections, `penalty` the squared distance between vertices and their
+    segments, integrated over the segments.
     """
 
     first: np.ndarray
@@ -42,18 +37,11 @@ class Match:
 
 
 @dataclass(frozen=True)
-class Edges:
-    """Valid pairs of a vertex and a segment as edges of the lattice, sorted by first, second and kind.
+class LatticeEdges:
+    """Valid pairs of a vertex and a segment as edges of the lattice, (n,) each, sorted by first, second and kind.
 
-    Attributes
-    ----------
-    first, second : (n,) int arrays
-        Lattice node at which the edge starts.
-    kind : (n,) int array
-        ADVANCE_SECOND or ADVANCE_FIRST.
-    length : (n,) array
-        Length of the segment.
-    penalty : (n,) array
+    An edge starts at the node (`first`, `second`); its `kind` is ADVANCE_SECOND or ADVANCE_FIRST, and its `length` that
+    of the segment.
     """
 
     first: np.ndarray
@@ -64,19 +52,14 @@ class Edges:
 
 
 def match_polylines(first: np.ndarray, second: np.ndarray, tolerance: float) -> list[Match]:
-    """Find the matches of two polylines in their given directions; the longest comes first.
+    """Find the matches of two polylines, (m, 2) and (n, 2), in their given directions; the longest comes first.
+
+    Vertices are abreast of each other, or else at steps of at most half the tolerance: the middle of a longer segment
+    may be too far from any vertex. `tolerance` is the maximum distance between a vertex and a segment, exclusive.
 
     The longest path wins, and of equally long ones the one with the lowest penalty. Paths that share or continue an
     edge form a cluster, and each cluster gives one match. The paper says that a pair does not "follow" one further
     along; any order works in which pairs precede their continuations, and that of the lattice nodes is used here.
-
-    Parameters
-    ----------
-    first, second : (m, 2), (n, 2) arrays
-        Vertices that are abreast of each other, or else at steps of at most half the tolerance: the middle of a longer
-        segment may be too far from any vertex.
-    tolerance : float
-        Maximum distance between a vertex and a segment, exclusive, in the unit of the vertices.
     """
     edges = lattice_edges(first, second, tolerance)
     if not len(edges.first):
@@ -91,14 +74,14 @@ def match_polylines(first: np.ndarray, second: np.ndarray, tolerance: float) -> 
     return [_trace(edges, predecessor, edge, length[edge], penalty[edge]) for edge in order[np.sort(best)].tolist()]
 
 
-def lattice_edges(first: np.ndarray, second: np.ndarray, tolerance: float) -> Edges:
+def lattice_edges(first: np.ndarray, second: np.ndarray, tolerance: float) -> LatticeEdges:
     """Pair every vertex with every segment of the other polyline that is closer than the tolerance."""
     ahead, turned = _near_pairs(first, second, tolerance), _near_pairs(second, first, tolerance)
     turned = (turned[1], turned[0], *turned[2:])
     kind = np.repeat([ADVANCE_SECOND, ADVANCE_FIRST], [len(ahead[0]), len(turned[0])])
     i, j, length, penalty = (np.concatenate(columns) for columns in zip(ahead, turned))
     order = np.lexsort((kind, j, i))
-    return Edges(i[order], j[order], kind[order], length[order], penalty[order])
+    return LatticeEdges(i[order], j[order], kind[order], length[order], penalty[order])
 
 
 def _near_pairs(points: np.ndarray, line: np.ndarray, tolerance: float) -> tuple[np.ndarray, ...]:
@@ -132,7 +115,7 @@ def squared_distance_integral(p: np.ndarray, q: np.ndarray) -> np.ndarray:
     return length / 3 * np.einsum("ij,ij->i", p, p + q) + length / 3 * np.einsum("ij,ij->i", q, q)
 
 
-def _lattice_nodes(edges: Edges) -> tuple[np.ndarray, np.ndarray, int]:
+def _lattice_nodes(edges: LatticeEdges) -> tuple[np.ndarray, np.ndarray, int]:
     """Find the lattice nodes, numbered from 0, where edges start, (n,), and end, (n,), and the number of nodes."""
     width = int(edges.second.max()) + 2
     begin = edges.first * width + edges.second
@@ -158,7 +141,7 @@ def _clusters(begin: np.ndarray, end: np.ndarray, node_count: int) -> np.ndarray
     return connected_components(links, directed=False)[1][: len(begin)]
 
 
-def _best_arrivals(edges: Edges, begin: np.ndarray, end: np.ndarray, node_count: int) -> tuple[np.ndarray, ...]:
+def _best_arrivals(edges: LatticeEdges, begin: np.ndarray, end: np.ndarray, node_count: int) -> tuple[np.ndarray, ...]:
     """Return length and penalty of the best path to each node and its last edge, -1 if there is none; (k,) each.
 
     Plain lists are used because the edges must be taken one by one, for which numpy is ten times slower.
@@ -183,7 +166,7 @@ def _longest_then_cheapest(length: np.ndarray, penalty: np.ndarray) -> np.ndarra
     return falling[np.lexsort((penalty[falling], rank))]
 
 
-def _trace(edges: Edges, predecessor: np.ndarray, last: int, length: float, penalty: float) -> Match:
+def _trace(edges: LatticeEdges, predecessor: np.ndarray, last: int, length: float, penalty: float) -> Match:
     """Follow the predecessors from a path's last edge to its first."""
     backwards = [last]
     while predecessor[backwards[-1]] >= 0:

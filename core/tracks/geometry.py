@@ -52,27 +52,13 @@ def measure_track_geometry(
     progress: Progress = SILENT,
     gauges: Sequence[Gauge] = (),
 ) -> tuple[TrackGeometry, ...]:
-    """Measure tracks at equal distances along their centerlines.
+    """Measure tracks at equal distances along their centerlines; the last station is the end of the track.
 
-    Parameters
-    ----------
-    centerlines : sequence of Centerline
-        Their `left_ids` and `right_ids` refer to the rails; if none of those exist, the nearest rails at gauge serve.
-    rails : sequence of RailLine
-        Preferably from `remeasuring.measure_rails`, with heights smoothed over 1 m only and with support by
-        chainage. For a rail without support, `sigma_mm` is used everywhere and `points` are assumed to be evenly
-        spaced; without known gaps, it counts as bridged only where it is missing.
-    head_width_m : float
-    step_m : float
-        Distance between stations; the last station is the end of the track.
-    progress : Progress
-    gauges : sequence of Gauge
-        Gauges that tracks may have, if the width of the heads depends on them.
-
-    Returns
-    -------
-    tuple of TrackGeometry
-        One per centerline, in the order given.
+    The `left_ids` and `right_ids` of centerlines refer to the rails; if none of those exist, the nearest rails at gauge
+    serve. Rails are preferably from `measure_rails`, with heights smoothed over 1 m only and with support by chainage.
+    For a rail without support, `sigma_mm` is used everywhere and `points` are assumed to be evenly spaced; without
+    known gaps, it counts as bridged only where it is missing. `gauges` are those that tracks may have, if the width of
+    the heads depends on them.
     """
     track_rails = _TrackRails(rails)
     measured = []

@@ -13,14 +13,14 @@ import numpy as np
 
 from ..polyline import Chords
 from ..rails import RailLine
-from .chaining import Chain, RailAhead, rails_ahead, runs_on
+from .chaining import RailAhead, TrackChain, rails_ahead, runs_on
 from .pairing import RailPair
 
 PROVISIONAL_STEP_M = 0.25
 """Spacing of the vertices: in a tram curve of 25 m the chords deviate by 0.3 mm."""
 
 
-def provisional_centerline(rails: Sequence[RailLine], chain: Chain, half_m: float, reach_m: float) -> np.ndarray:
+def provisional_centerline(rails: Sequence[RailLine], chain: TrackChain, half_m: float, reach_m: float) -> np.ndarray:
     """Draw a line, (n, 2), half a spacing from a rail of the track, and straight where there is no rail.
 
     A rail that does not reach the next section is followed for `reach_m` at most.
@@ -100,16 +100,8 @@ of 5 m in curves."""
 class Meeting:
     """Intersections of normals with the rails of one side, (n,) arrays.
 
-    Attributes
-    ----------
-    distance_m, height_m : float
-        Distance and height of the rail; NaN where there is none near the expected distance.
-    rail : int
-        Number of the rail.
-    t : float
-        Plan chainage along the rail.
-    paired : bool
-        Whether the rail is paired there.
+    `distance_m` and `height_m` are those of the rail, NaN where there is none near the expected distance; `rail` is its
+    number, `t` the plan chainage along it, and `paired` holds where it is paired.
     """
 
     distance_m: np.ndarray
@@ -128,14 +120,8 @@ class Meeting:
 class Side:
     """The rails on one side of a track, in sections.
 
-    Attributes
-    ----------
-    chords : Chords
-        The sections, each from its margin before to its margin behind.
-    rail : (k,) int array
-        Number of the rail of each section.
-    paired : (n,) bool array
-        Whether a place of the chords is in the section itself, not in the margin.
+    The `chords` are the sections, each from its margin before to its margin behind; `rail`, (k,), is the number of the
+    rail of each section, and `paired`, (n,), holds where a place of the chords is in the section itself.
     """
 
     chords: Chords
@@ -144,15 +130,9 @@ class Side:
 
     @classmethod
     def of(cls, rails: Sequence[RailLine], spans: Sequence[tuple[int, tuple[float, float]]], margin_m: float) -> Side:
-        """Cut sections out of their rails.
+        """Cut sections out of their rails; each is the number of a rail and the chainages of its start and end.
 
-        Parameters
-        ----------
-        rails : sequence of RailLine
-        spans : sequence of tuple
-            Number of the rail and chainages of start and end of each section.
-        margin_m : float
-            Length added at both ends, for a rail that continues while the other one has a gap.
+        `margin_m` is added at both ends, for a rail that continues while the other one has a gap.
         """
         ends = [(min(span), max(span)) for _, span in spans]
         parts = [

@@ -64,15 +64,10 @@ LEFT, RIGHT = 1, -1
 
 @dataclass(frozen=True)
 class RailPair:
-    """A section of track: two rails at gauge, in the direction in which `left` is on the left.
+    """A section of track: two rails at gauge, by number, in the direction in which `left` is on the left.
 
-    Attributes
-    ----------
-    left, right : int
-        Numbers of the rails in the sequence that was paired.
-    left_span, right_span : tuple of float
-        Plan chainage along each rail at the start and at the end of the section; the second is the smaller one if the
-        rail runs against the direction of the section.
+    The spans are the plan chainages along each rail at the start and at the end of the section; the second is the
+    smaller one if the rail runs against the direction of the section.
     """
 
     left: int
@@ -96,24 +91,12 @@ def pair_rails(
     other_spacings_m: Sequence[float] = (),
     progress: Progress = SILENT,
 ) -> tuple[RailPair, ...]:
-    """Find the sections along which two rails of one class are at gauge (docs/method.md section 8.3).
+    """Find the sections along which two rails of one class are at gauge (docs/method.md section 8.3), longest first.
 
-    Each rail is moved half the spacing towards the other, and the moved curves are matched. Every rail has two sides,
-    and each section of a side belongs to one track, that of the longest match.
-
-    Parameters
-    ----------
-    rails : sequence of RailLine
-    parameters : Parameters
-        The gauge and the width of the heads together are the distance between the rail lines.
-    other_spacings_m : sequence of float
-        Distances at which rails are paired for other gauges: a match that is closer to one of them is left to it.
-    progress : Progress
-
-    Returns
-    -------
-    tuple of RailPair
-        The longest first. A section longer than CHUNK_M is returned in parts.
+    Each rail is moved half the spacing, gauge plus width of the heads, towards the other, and the moved curves are
+    matched. Every rail has two sides, and each section of a side belongs to one track, that of the longest match. A
+    match that is closer to one of `other_spacings_m`, the distances of the rails of other gauges, is left to it. A
+    section longer than CHUNK_M is returned in parts.
     """
     if len(rails) < 2:
         return ()

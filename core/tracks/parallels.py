@@ -47,16 +47,9 @@ CROWDED = (
 class Parallels:
     """Pairs of stations that are abreast on two rails, (n,) arrays each.
 
-    Attributes
-    ----------
-    a, b : int
-        Numbers of the rails, a < b.
-    t_a, t_b : float
-        Plan chainages of the stations, each along its own rail.
-    left_m : float
-        Distance of the second rail, positive if it is to the left of the first.
-    same : bool
-        Whether both rails have the same direction.
+    `a` < `b` are the numbers of the rails, `t_a` and `t_b` the plan chainages of the stations along them. `left_m` is
+    the distance of the second rail, positive if it is to the left of the first; `same`, whether both have the same
+    direction.
     """
 
     a: np.ndarray
@@ -81,15 +74,7 @@ class Parallels:
 
 
 def find_parallels(rails: Sequence[RailLine], reach_m: float = MAX_SPACING_M, progress: Progress = SILENT) -> Parallels:
-    """Find stations that are abreast on two rails of one class.
-
-    Parameters
-    ----------
-    rails : sequence of RailLine
-    reach_m : float
-        Maximum distance of the rails.
-    progress : Progress
-    """
+    """Find stations that are abreast on two rails of one class, at most `reach_m` apart."""
     codes = np.array([rail.class_code for rail in rails])
     columns = _stations(rails)
     crowded = _is_crowded(columns[1])
@@ -134,18 +119,9 @@ def _stations(rails: Sequence[RailLine]) -> tuple[np.ndarray, ...]:
 
 
 def most_common_spacing(rails: Sequence[RailLine], min_length_m: float) -> float | None:
-    """Measure the distance at which the greatest length of neighbouring rails is parallel.
+    """Measure the distance between rail lines, metres, at which the greatest length of neighbours is parallel.
 
-    Parameters
-    ----------
-    rails : sequence of RailLine
-    min_length_m : float
-        Minimum length at this distance.
-
-    Returns
-    -------
-    float or None
-        Distance between the rail lines in metres; None if no rails are parallel for the minimum length.
+    None if no rails are parallel over at least `min_length_m`.
     """
     if len(rails) < 2:
         return None
@@ -174,13 +150,8 @@ def width_at(spacing_m: float, gauges: Sequence[Gauge]) -> float:
 def widths_by_gauge(rails: Sequence[RailLine], gauges: Sequence[Gauge], tolerance_m: float) -> np.ndarray:
     """Return the width of the head of each rail, (n,) metres: that of the gauge at which it runs for the most part.
 
-    Parameters
-    ----------
-    rails : sequence of RailLine
-    gauges : sequence of Gauge
-        The first one decides where a rail has no partner, or is common to tracks of two gauges over the same length.
-    tolerance_m : float
-        Largest deviation of a track from its gauge.
+    The first gauge decides where a rail has no partner, or is common to tracks of two gauges over the same length.
+    `tolerance_m` is the largest deviation of a track from its gauge.
     """
     widths_m = np.array([width_m for _, width_m in gauges])
     if not len(rails) or np.all(widths_m == widths_m[0]):

@@ -46,7 +46,6 @@ def vectorize(
         Ends at most this far apart are joined if each points at the other within this angle.
     min_length_m : float
         Shorter lines are dropped unless they connect two junctions.
-    progress : Progress
 
     Returns
     -------

@@ -56,12 +56,7 @@ def part_branches(network: LineNetwork) -> LineNetwork:
     """Let the stem of every branching run on into its steadiest leg, and the other legs end freely.
 
     `attach_branches` leads these back. Where three rails part within a few metres, a line too short for its direction
-    to be measured connects two branchings, which are taken as one.
-
-    Parameters
-    ----------
-    network : LineNetwork
-        Lines without passes.
+    to be measured connects two branchings, which are taken as one. The network has no passes yet.
     """
     legs_of = {stem: legs for _, stem, legs in branchings(network)}
     short = network.lengths() < SKIP_M + DIRECTION_M
@@ -125,14 +120,7 @@ def branchings(network: LineNetwork) -> Iterator[tuple[int, int, list[int]]]:
 def attach_branches(network: LineNetwork, seen: cKDTree, max_gap_m: float, progress: Progress = SILENT) -> LineNetwork:
     """Extend free ends to the rails from which they branch off, by curves that explain both lines.
 
-    Parameters
-    ----------
-    network : LineNetwork
-    seen : cKDTree
-        Places of rail cells.
-    max_gap_m : float
-        Largest length of the curve away from all cells.
-    progress : Progress
+    Such a curve is at most `max_gap_m` long away from all cells, `seen`.
     """
     if not network.lines:
         return network

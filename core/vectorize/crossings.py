@@ -47,12 +47,7 @@ def resolve_crossings(network: LineNetwork) -> LineNetwork:
     A crossing is a node of four lines; or a short line between two nodes of three; or a node of three whose fourth leg
     ends freely before it, because a flangeway of the frog cuts it off; or several nodes and ends close together, which
     four legs leave. It is resolved if its four legs form two pairs that rails could follow. The rails then cross
-    without a node.
-
-    Parameters
-    ----------
-    network : LineNetwork
-        Lines without passes.
+    without a node; the network has no passes before.
     """
     joins: dict[tuple[int, int], Bridge] = {}
     cuts_m: dict[int, float] = {}

@@ -48,16 +48,8 @@ def join_gaps(
     Joining goes in rounds: each joins the pairs of ends that are each other's cheapest partner, because the direction
     of a joined line is known better.
 
-    Parameters
-    ----------
-    network : LineNetwork
-    seen : cKDTree
-        Places of rail cells.
-    max_gap_m, gap_angle_deg : float
-        Ends are joined if at most this length between them is away from all cells, and each points at the other within
-        this angle. Where rails merge, lines end without a gap: up to `MAX_MERGED_M` are bridged there.
-    progress : Progress
-        Only asked for a cancel, because the number of rounds is unknown.
+    At most `max_gap_m` between the ends is away from all cells, `seen`, and each points at the other within
+    `gap_angle_deg`. Where rails merge, lines end without a gap: up to `MAX_MERGED_M` are bridged there.
     """
     while True:
         joins = _possible_joins(network, seen, max_gap_m, gap_angle_deg, progress)

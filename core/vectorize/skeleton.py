@@ -40,14 +40,9 @@ _MARGIN = HOLE_CELLS + 2 * CLOSING_RADIUS_CELLS + 1
 
 @dataclass(frozen=True)
 class Pixels:
-    """A set of pixels, sorted by row and column.
+    """A set of pixels, (n, 2), sorted by row and column.
 
-    Attributes
-    ----------
-    cells : (n, 2) int64 array
-        Rows and columns.
-    neighbours : (n, 8) int array
-        Number of the neighbour in each direction of `RING`; n where there is none.
+    `neighbours`, (n, 8), are their numbers in the directions of `RING`; n where there is none.
     """
 
     cells: np.ndarray

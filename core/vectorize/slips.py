@@ -146,15 +146,9 @@ class _Cross:
 
 @dataclass(frozen=True)
 class Slip:
-    """A crossing with curves that connect its legs.
+    """A crossing with curves that connect its legs, which are clear from `clear_m` from the middle.
 
-    Attributes
-    ----------
-    cross : _Cross
-    clear_m : float
-        Distance from the middle from which the legs are clear.
-    heights : tuple of (float, float)
-        For each curve, how far from the crossing it passes, and the side, 1 for the left.
+    For each curve, `heights` has how far from the crossing it passes, and the side, 1 for the left.
     """
 
     cross: _Cross

@@ -23,17 +23,7 @@ OFF_M = 0.5
 
 @dataclass(frozen=True)
 class FlownScene:
-    """A cloud and the guides along which tracks are looked for.
-
-    Attributes
-    ----------
-    design : Design
-    flight : Flight
-    cloud : AirborneCloud
-    guides : list of (k, 2) array
-    meant : sequence of int or None
-        Track that each guide means; None where none is.
-    """
+    """A cloud and the guides, (k, 2) each, along which tracks are looked for; `meant` is the track of each, or None."""
 
     design: Design
     flight: Flight

@@ -17,18 +17,9 @@ SPACING_M = 1.507
 
 @dataclass(frozen=True)
 class Design:
-    """A railway.
+    """A railway, flown along the line `where`, (n, 2), up to `width_m` from it.
 
-    Attributes
-    ----------
-    world : World
-    tracks : tuple of Track
-    where : (n, 2) array
-        Line along which it is flown.
-    width_m : float
-        Distance from this line up to which it is flown.
-    parked : tuple of (int, float, float)
-        Trains: the track that each hides, and chainages of its ends.
+    `parked` are trains: the track that each hides, and the chainages of its ends.
     """
 
     world: World
@@ -55,14 +46,8 @@ def curved_line(
 ) -> Design:
     """Return a line with a canted curve between transitions: trough, platform, parked train and plants.
 
-    Parameters
-    ----------
-    seed : int
-        Chooses radius, cant, gradient, direction, spacing and what lies beside the line.
-    length_m : float
-    tracks : int
-    cant_m, radius_m : float, optional
-        Instead of those of the seed.
+    The seed chooses radius, cant, gradient, direction, spacing and what lies beside the line, unless `cant_m` and
+    `radius_m` are given.
     """
     rng = np.random.RandomState(seed)
     radius_m = rng.choice([300.0, 450.0, 700.0, 1200.0, 2500.0]) if radius_m is None else radius_m

@@ -30,7 +30,6 @@ class Flight:
         Diameter of the beam on the ground.
     noise_m : float
         Standard deviation of the range.
-    strips : int
     strip_up_m, strip_across_m : float
         Distance between the strips in height and in plan; the truth lies in the middle.
     aspect : float
@@ -55,14 +54,7 @@ class Flight:
 
 @dataclass(frozen=True)
 class AirborneCloud:
-    """Points of a flight.
-
-    Attributes
-    ----------
-    xyz : (n, 3) array
-        Metres.
-    strip : (n,) int array
-    """
+    """Points of a flight, (n, 3) metres, and the strip of each, (n,)."""
 
     xyz: np.ndarray
     strip: np.ndarray
@@ -76,17 +68,7 @@ def beam(footprint_m: float) -> np.ndarray:
 
 
 def fly(world: World, where: np.ndarray, width_m: float, flight: Flight, seed: int = 0) -> AirborneCloud:
-    """Scan a world.
-
-    Parameters
-    ----------
-    world : World
-    where : (k, 2) array
-        Middle of the area, a line; only points within `width_m` of it are made.
-    width_m : float
-    flight : Flight
-    seed : int
-    """
+    """Scan a world within `width_m` of the line `where`, (k, 2)."""
     rng = np.random.RandomState(seed)
     turn = rng.uniform(0, 2 * np.pi)
     shift_direction = np.array([np.cos(turn), np.sin(turn)])

@@ -35,14 +35,9 @@ LATTICE = 512
 
 @dataclass(frozen=True)
 class Axis:
-    """A line along which things lie.
+    """A line along which things lie: (n, 3) samples every `STEP_M`, with the height of rail tops or the thing's zero.
 
-    Attributes
-    ----------
-    xyz : (n, 3) array
-        Samples every `STEP_M`; the height is that of the top of the rails, or of the thing's zero.
-    heading, slope : (n,) arrays
-        Direction, radians, and rise across per metre to the left.
+    `heading` is the direction in radians, `slope` the rise per metre to the left, (n,) each.
     """
 
     xyz: np.ndarray
@@ -66,14 +61,8 @@ class Axis:
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Find the beams, at places (n, 2), that meet the ground beside the line.
 
-        Returns
-        -------
-        found : (k,) int array
-            The beams.
-        along, left : (k, m) arrays
-            Chainage and distance to the left of each place in the beam.
-        nearest : (k,) int array
-            The sample next to each.
+        Returns the k beams, the chainage and the distance to the left of each place in them, (k, m) each, and the
+        sample next to each, (k,).
         """
         distance, nearest = tree.query(places, distance_upper_bound=REACH_M)
         found = np.flatnonzero(np.isfinite(distance))
@@ -90,17 +79,9 @@ class Axis:
 class Band:
     """Something with the same cross-section along a line: a road, a ditch, a platform, a trough, a train.
 
-    Attributes
-    ----------
-    axis : Axis
-    profile : (k, 2) array
-        Metres to the left of the line, rising, and above it.
-    start_m, end_m : float
-        Chainages between which it lies.
-    covers : bool
-        Whether it hides what is lower only; otherwise it replaces the ground, as a ditch does.
-    every_m, length_m : float
-        If given, it is repeated: pieces of this length, such as parked cars.
+    The profile, (k, 2), has metres to the left of the line, rising, and above it. A band that `covers` hides only what
+    is lower; others replace the ground, as a ditch does. With `every_m` and `length_m` it is repeated in pieces of this
+    length, such as parked cars.
     """
 
     axis: Axis
@@ -123,19 +104,10 @@ class Band:
 
 @dataclass
 class World:
-    """Tracks on their beds, bands, and rough ground.
+    """Tracks on their beds, bands in the order in which they are laid, and rough ground.
 
-    Attributes
-    ----------
-    tracks : sequence of Track
-        With curves in steps of `STEP_M`.
-    bands : list of Band
-        In the order in which they are laid.
-    ballast_m : float
-        Ballast piled above its usual top: 0 shows 18 cm of the rail above the sleepers.
-    six_foot_m : float
-        Ballast between two tracks, below the top of the lower one's rails.
-    seed : int
+    The curves of tracks have steps of `STEP_M`. `ballast_m` is ballast piled above its usual top, where 0 shows 18 cm
+    of the rail above the sleepers; `six_foot_m`, ballast between two tracks below the rail tops of the lower one.
     """
 
     tracks: Sequence[Track]
@@ -151,17 +123,9 @@ class World:
         self._trees: dict[int, cKDTree] = {}
 
     def heights(self, places: np.ndarray, beam: np.ndarray) -> np.ndarray:
-        """Return the mean height of the surface under beams.
+        """Return the mean height of the surface under beams at places, (n, 2).
 
-        Parameters
-        ----------
-        places : (n, 2) array
-        beam : (m, 2) array
-            Places within the footprint about its middle.
-
-        Returns
-        -------
-        (n,) array
+        `beam`, (m, 2), has places within the footprint about its middle.
         """
         shape = (len(places), len(beam))
         bed, covered, fill = np.full(shape, -np.inf), np.zeros(shape), np.full(shape, np.inf)

@@ -36,23 +36,9 @@ OFFSETS_AT, BOUNDS_AT, INFO_AT = 155, 179, 375 + 54
 
 
 def lay_tiles(folder: Path, count: int, density: float, octree: bool = False) -> Path:
-    """Write a folder of tiles, and guides beside it; all tiles have the same points.
+    """Write a folder of tiles, COPC files with `octree`, and return the guides beside it, two for each row.
 
-    Parameters
-    ----------
-    folder : Path
-        To be made.
-    count : int
-        Number of tiles.
-    density : float
-        Points per square metre.
-    octree : bool
-        Whether they are COPC files.
-
-    Returns
-    -------
-    Path
-        The guides: two for each row.
+    All tiles have the same points, `density` of them per square metre.
     """
     folder.mkdir()
     first = folder / ("tile_000.copc.laz" if octree else "tile_000.laz")

@@ -8,10 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ...core.clouds.crs import parse_crs
 from ...core.clouds.las import laspy
 from ...core.frame import LocalFrame
-from ..scenes.write import MADE, SCALE_M
+from ..scenes.las import las_data
 from .flight import AirborneCloud
 
 CRS, ORIGIN = "EPSG:25832", np.array([500_400.0, 5_500_400.0, 0.0])
@@ -24,25 +23,9 @@ GROUND = 2
 
 
 def las_of(cloud: AirborneCloud, class_code: int = GROUND, frame: LocalFrame = FRAME) -> laspy.LasData:
-    """Return a cloud as LAS 1.4, with a source id for each strip.
-
-    Parameters
-    ----------
-    cloud : AirborneCloud
-    class_code : int
-        Of all points.
-    frame : LocalFrame
-        Where the zero of the cloud lies, with the coordinate system.
-    """
-    header = laspy.LasHeader(version="1.4", point_format=6)
-    header.scales, header.offsets = np.full(3, SCALE_M), frame.origin
-    header.creation_date, header.generating_software = MADE, "Rail Extract scenes"
-    header.add_crs(parse_crs(str(frame.crs_wkt)))
-    points = laspy.LasData(header)
-    points.x, points.y, points.z = frame.to_crs(cloud.xyz).T
-    points.classification = np.full(len(cloud.xyz), class_code, np.uint8)
-    points.point_source_id = cloud.strip + 1
-    return points
+    """Return a cloud as LAS 1.4, with a source id for each strip; the zero of the cloud is that of the frame."""
+    xyz, crs, strips = frame.to_crs(cloud.xyz), str(frame.crs_wkt), cloud.strip + 1
+    return las_data(xyz, crs, offsets=frame.origin, classification=class_code, point_source_id=strips)
 
 
 def write_airborne(cloud: AirborneCloud, path: Path, class_code: int = GROUND, frame: LocalFrame = FRAME) -> None:

@@ -19,13 +19,7 @@ TRACK_SPACING_M = (3.5, 6.0)
 
 
 def random_radius(rng: np.random.Generator, min_radius_m: float, max_radius_m: float = MAX_RADIUS_M) -> float:
-    """Draw a radius whose logarithm is uniformly distributed.
-
-    Parameters
-    ----------
-    rng : numpy Generator
-    min_radius_m, max_radius_m : float
-    """
+    """Draw a radius whose logarithm is uniformly distributed."""
     return math.exp(rng.uniform(math.log(min_radius_m), math.log(max_radius_m)))
 
 
@@ -37,14 +31,8 @@ def straight(rng: np.random.Generator) -> Curve:
 def bend(rng: np.random.Generator, radius_m: float, turns: tuple[int, ...]) -> Curve:
     """Draw arcs of similar radius with transitions between them and straights at both ends.
 
-    Parameters
-    ----------
-    rng : numpy Generator
-    radius_m : float
-        Smallest radius.
-    turns : tuple of int
-        1 for an arc to the left, -1 for one to the right: (1, -1) is a reverse curve. Some arcs have no transition, as
-        in turnouts and yards.
+    `radius_m` is the smallest radius. Turns are 1 for an arc to the left and -1 for one to the right: (1, -1) is a
+    reverse curve. Some arcs have no transition, as in turnouts and yards.
     """
     elements, curvature = [Element(HALF_LENGTH_M)], 0.0
     for turn in (*turns, 0):

@@ -58,14 +58,8 @@ class Pose:
 class Table:
     """Combinations with unit chord, by share and by the deflections at start and end; arrays are (shares, n, n).
 
-    Attributes
-    ----------
-    skew : array
-        Approximate solution, which is refined for the combination that is drawn.
-    sharpest : array
-        Largest curvature.
-    energy : array
-        Integral of the squared curvature.
+    `skew` is an approximate solution, which is refined for the combination that is drawn, `sharpest` the largest
+    curvature, and `energy` the integral of the squared curvature.
     """
 
     skew: np.ndarray
@@ -73,21 +67,7 @@ class Table:
     energy: np.ndarray
 
     def look_up(self, values: np.ndarray, share: int, first: np.ndarray, last: np.ndarray) -> np.ndarray:
-        """Interpolate one of the arrays; outside the table it has the value at the border.
-
-        Parameters
-        ----------
-        values : (shares, n, n) array
-            One of the attributes.
-        share : int
-            Index into `SHARES`.
-        first, last : array
-            Deflections at both ends, radians.
-
-        Returns
-        -------
-        array of the same shape as `first`
-        """
+        """Interpolate one of the arrays at deflections in radians; outside the table it has the value at the border."""
         places = [(np.degrees(np.ravel(angle)) + MAX_DEFLECTION_DEG) / GRID_DEG for angle in (first, last)]
         return ndimage.map_coordinates(values[share], places, order=1, mode="nearest").reshape(np.shape(first))
 
@@ -108,18 +88,9 @@ def table() -> Table:
 
 
 def join(start: Pose, end: Pose, share: int = 1) -> list[Element] | None:
-    """Join two oriented points by a combination.
+    """Join two oriented points by a combination for `trace` from `start`; None where the deflections are too large.
 
-    Parameters
-    ----------
-    start, end : Pose
-    share : int
-        Index into `SHARES`.
-
-    Returns
-    -------
-    list of Element or None
-        For `trace` from `start`; None where the deflections are too large.
+    `share` is an index into `SHARES`.
     """
     chord = math.hypot(end.x - start.x, end.y - start.y)
     first, last = (np.asarray(angle) for angle in _deflections(start, end))
@@ -138,22 +109,9 @@ def join(start: Pose, end: Pose, share: int = 1) -> list[Element] | None:
 def random_joins(
     rng: np.random.Generator, poses: list[Pose], count: int, min_radius_m: float
 ) -> list[tuple[Pose, list[Element]]]:
-    """Join up to `count` pairs of poses; the smaller the bending energy, the more likely a pair is drawn.
+    """Return start and elements of up to `count` joined pairs of poses; less bending energy makes a pair more likely.
 
-    A pose can be passed in both directions, and two poses are joined at most once.
-
-    Parameters
-    ----------
-    rng : numpy Generator
-    poses : list of Pose
-    count : int
-    min_radius_m : float
-        Combinations with a smaller radius are excluded.
-
-    Returns
-    -------
-    list of (Pose, list of Element)
-        Start and elements of each combination.
+    A pose can be passed in both directions, and two poses are joined at most once, with no radius below `min_radius_m`.
     """
     pairs = [
         (start, end)

@@ -73,18 +73,9 @@ class Pair:
 def draw_pair(
     rng: np.random.Generator, layout: Layout, window: Window, head_width_m: float, severity: float, thin: bool = False
 ) -> Pair:
-    """Draw a layout as a scanner shows it and as it is.
+    """Draw a layout as a scanner shows it and as it is, with a severity from 0 to 1.
 
-    Parameters
-    ----------
-    rng : numpy Generator
-    layout : Layout
-    window : Window
-    head_width_m : float
-    severity : float
-        0 to 1.
-    thin : bool
-        Whether rails have only as many points as `THIN_DENSITY` states.
+    Thin rails have only as many points as `THIN_DENSITY` states.
     """
     observed, label, distractor = np.zeros((3, window.size, window.size), dtype=bool)
     gap, lengths = np.zeros((window.size, window.size), dtype=np.int16), []
@@ -120,16 +111,9 @@ def draw_pair(
 class _Scanner:
     """How the points of one raster were scanned.
 
-    Attributes
-    ----------
-    density : float or None
-        Points per metre of rail; None stands for complete coverage.
-    profile_m, noise_m : float
-        Distance of profiles, scatter of points.
-    offset_m : (2,) array
-        Half of the offset between two scans; zero where there is only one.
-    fastenings : float
-        Mean number of points on each fastening that are classified as rail.
+    `density` is the number of points per metre of rail, None for complete coverage, `profile_m` the distance of
+    profiles, `noise_m` the scatter of points, `offset_m` half of the offset between two scans, zero where there is only
+    one, and `fastenings` the mean number of points on each fastening that are classified as rail.
     """
 
     density: float | None

@@ -40,17 +40,9 @@ class Window:
 def draw_label(
     target: np.ndarray, window: Window, xy: np.ndarray, normal: np.ndarray, width_m: float, value: int = 1
 ) -> None:
-    """Set the cells whose centre is at most half a railhead away from the line to a value.
+    """Set the cells whose centre is at most half a railhead away from a line to a value.
 
-    Parameters
-    ----------
-    target : (size, size) array of bool or int, changed
-    window : Window
-    xy, normal : (n, 2) arrays
-        Samples of the line, at most a cell apart, and unit normals.
-    width_m : float
-        Railhead width.
-    value : int
+    Samples of the line, (n, 2), are at most a cell apart; normals are unit vectors.
     """
     kept = window.near(xy, width_m)
     if np.count_nonzero(kept) < 2:
@@ -72,17 +64,9 @@ def draw_label(
 
 
 def scan_coverage(xy: np.ndarray, normal: np.ndarray, right_m: np.ndarray, left_m: np.ndarray) -> np.ndarray:
-    """Return points that cover a rail completely, `LATERAL_STEP_M` apart across it.
+    """Return points, (m, 2), that cover a rail completely, `LATERAL_STEP_M` apart across it.
 
-    Parameters
-    ----------
-    xy, normal : (n, 2) arrays
-    right_m, left_m : (n,) arrays
-        Offsets of the head's two edges along the normal; the right one is negative.
-
-    Returns
-    -------
-    (m, 2) array
+    `right_m` and `left_m`, (n,), are the offsets of the head's two edges along the normal; the right one is negative.
     """
     if len(xy) == 0:
         return np.empty((0, 2))
@@ -102,24 +86,9 @@ def scan_profiles(
     density: float,
     profile_m: float,
 ) -> np.ndarray:
-    """Return points that a scanner finds on a rail, in profiles across it.
+    """Return points, (m, 2), that a scanner finds on a rail, in profiles across it, `profile_m` apart.
 
-    Parameters
-    ----------
-    rng : numpy Generator
-    xy, normal : (n, 2) arrays
-    right_m, left_m : (n,) arrays
-        Offsets of the head's two edges along the normal; the right one is negative.
-    seen : (n,) bool array
-        Where the rail has points.
-    density : float
-        Mean number of points per metre of rail.
-    profile_m : float
-        Distance between profiles.
-
-    Returns
-    -------
-    (m, 2) array
+    Edges are those of `scan_coverage`; `seen` says where the rail has points, `density` of them per metre on average.
     """
     if len(xy) < 2:
         return np.empty((0, 2))

@@ -42,14 +42,7 @@ def _nearest(first: np.ndarray, second: np.ndarray) -> tuple[int, int]:
 def guard_offset(spacing_m: float, head_width_m: float, flangeway_m: float) -> float:
     """Return the distance from the axis of a track to the axis of a guard rail: a head and a flangeway inside the rail.
 
-    Parameters
-    ----------
-    spacing_m : float
-        Distance between the two railhead centres.
-    head_width_m : float
-        Width of the rail and of the guard rail.
-    flangeway_m : float
-        Clear width between them.
+    `spacing_m` is the distance between the two railhead centres; rail and guard rail have one width.
     """
     return 0.5 * spacing_m - head_width_m - flangeway_m
 
@@ -59,18 +52,8 @@ def guard(
 ) -> RailPath:
     """Lay a guard rail inside one of the rails of a track, flared at both ends.
 
-    Parameters
-    ----------
-    rng : numpy Generator
-    axis : Curve
-        Axis of the track.
-    at : int
-        Sample of the axis at the middle of the guard rail.
-    side : int
-        1 for the left rail, -1 for the right one.
-    size : TrackSize
-    length_m : tuple of float
-        Smallest and largest length.
+    `at` is the sample of the axis at its middle; `side` is 1 for the left rail and -1 for the right one; `length_m` has
+    the smallest and largest length.
     """
     half = int(0.5 * rng.uniform(*length_m) / axis.step_m)
     first, last = max(at - half, 0), min(at + half, len(axis.xy))
@@ -82,39 +65,17 @@ def guard(
 
 
 def check_rail(rng: np.random.Generator, axis: Curve, side: int, size: TrackSize) -> RailPath:
-    """Lay a check rail along the inner rail of a sharp curve.
-
-    Parameters
-    ----------
-    rng : numpy Generator
-    axis : Curve
-        Axis of the track.
-    side : int
-        1 where the curve turns left, -1 where it turns right.
-    size : TrackSize
-    """
+    """Lay a check rail along the inner rail of a sharp curve, which turns left with `side` 1 and right with -1."""
     length_m = rng.uniform(8.0, 40.0)
     return guard(rng, axis, len(axis.xy) // 2 + int(rng.uniform(-5.0, 5.0) / axis.step_m), side, size, (length_m,) * 2)
 
 
 def frog(rng: np.random.Generator, main: Curve, side: Curve, hand: int, size: TrackSize) -> tuple[Layout, int]:
-    """Lay the opening, the guard rails and the wing rails of a turnout's frog.
+    """Lay the opening, guard rails and wing rails of a turnout's frog; returns the sample of the main track there.
 
-    Parameters
-    ----------
-    rng : numpy Generator
-    main, side : Curve
-        Axes of the main track and of the branch, both from the toe.
-    hand : int
-        1 where the branch leaves to the left, -1 where it leaves to the right.
-    size : TrackSize
-
-    Returns
-    -------
-    Layout
-        The opening and, in most cases, two guard rails opposite the frog and two wing rails. The frog is the spot.
-    int
-        Sample of the main track at the frog; its last one where the rails do not cross.
+    Both axes begin at the toe; `hand` is 1 where the branch leaves to the left and -1 to the right. Most frogs have two
+    guard rails opposite and two wing rails. The frog is the spot of the layout; its sample is the last one where the
+    rails do not cross.
     """
     places = crossing(main.offset(0.5 * hand * size.spacing_m), side.offset(-0.5 * hand * size.spacing_m))
     if places is None:

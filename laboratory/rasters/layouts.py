@@ -58,15 +58,7 @@ can be joined."""
 
 
 def random_layout(rng: np.random.Generator, size: TrackSize, family: str | None = None) -> Layout:
-    """Draw a layout.
-
-    Parameters
-    ----------
-    rng : numpy Generator
-    size : TrackSize
-    family : str, optional
-        One of `FAMILIES` or `RARE_FAMILIES`; by default, one of `FAMILIES` is drawn by `WEIGHTS`.
-    """
+    """Draw a layout of a family; by default, one of `FAMILIES` is drawn by `WEIGHTS`."""
     if family is None:
         names = list(WEIGHTS)
         family = names[rng.choice(len(names), p=np.array(list(WEIGHTS.values())) / sum(WEIGHTS.values()))]

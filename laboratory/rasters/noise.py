@@ -49,14 +49,7 @@ def worst_share(severity: float) -> float:
 
 
 def lone_lines(rng: np.random.Generator, window: Window, severity: float) -> list[RailPath]:
-    """Draw short straight lines that belong to no track: cables, ends of sleepers, edges of platforms.
-
-    Parameters
-    ----------
-    rng : numpy Generator
-    window : Window
-    severity : float
-    """
+    """Draw short straight lines that belong to no track: cables, ends of sleepers, edges of platforms."""
     lines = []
     for _ in range(rng.poisson(LONE_LINES * severity * _area(window))):
         heading = rng.uniform(-math.pi, math.pi)
@@ -68,18 +61,7 @@ def lone_lines(rng: np.random.Generator, window: Window, severity: float) -> lis
 
 
 def shadows(rng: np.random.Generator, window: Window, severity: float) -> np.ndarray:
-    """Draw wedges that are hidden from the scanner by masts, cabinets and trains.
-
-    Parameters
-    ----------
-    rng : numpy Generator
-    window : Window
-    severity : float
-
-    Returns
-    -------
-    (size, size) bool array
-    """
+    """Draw wedges, (size, size), that are hidden from the scanner by masts, cabinets and trains."""
     hidden = np.zeros((window.size, window.size), dtype=bool)
     centres = (np.arange(window.size) + 0.5) * window.cell_m
     for _ in range(rng.poisson(SHADOWS * severity * _area(window))):
@@ -98,20 +80,7 @@ def shadows(rng: np.random.Generator, window: Window, severity: float) -> np.nda
 def flip(
     rng: np.random.Generator, observed: np.ndarray, label: np.ndarray, severity: float, cell_m: float
 ) -> np.ndarray:
-    """Clear random cells and set others; near the rails more cells are set, because ballast is classified as rail.
-
-    Parameters
-    ----------
-    rng : numpy Generator
-    observed, label : (size, size) bool arrays
-    severity : float
-    cell_m : float
-        Side of a cell.
-
-    Returns
-    -------
-    (size, size) bool array
-    """
+    """Clear random cells and set others; near the rails more cells are set, because ballast is classified as rail."""
     lost = rng.random() * LOST_SHARE * severity
     stray = rng.random() ** 3 * STRAY_SHARE * severity
     beside = rng.random() ** 2 * BALLAST_SHARE * severity * (1 + WORST_BALLAST * worst_share(severity))
@@ -124,18 +93,7 @@ def flip(
 
 
 def scatter_patches(rng: np.random.Generator, observed: np.ndarray, severity: float) -> np.ndarray:
-    """Scatter elliptic patches: most set cells, as vegetation classified as rail does; some clear cells.
-
-    Parameters
-    ----------
-    rng : numpy Generator
-    observed : (size, size) bool array
-    severity : float
-
-    Returns
-    -------
-    (size, size) bool array
-    """
+    """Scatter elliptic patches: most set cells, as vegetation classified as rail does; some clear cells."""
     size = len(observed)
     result = observed.copy()
     most = PATCHES * severity * (1 + WORST_PATCHES * worst_share(severity)) * (size / 1024) ** 2

@@ -49,14 +49,8 @@ def ratio_near(rng: np.random.Generator, ratio: float) -> float:
 def training_pair(rng: np.random.Generator, size: int, ratio: float | None = None) -> Pair:
     """Draw a pair for training: as `random_pair` does, and some of rare layouts and of thin rails.
 
-    Parameters
-    ----------
-    rng : numpy Generator
-        The pair depends on its state alone.
-    size : int
-        Cells along the side.
-    ratio : float, optional
-        Gauge divided by railhead width; by default, `random_ratio`.
+    The pair depends on the state of the generator alone. `ratio` is gauge divided by railhead width, by default
+    `random_ratio`.
     """
     family = list(RARE_FAMILIES)[rng.integers(len(RARE_FAMILIES))] if rng.random() < RARE_SHARE else None
     thin = rng.random() < THIN_SHARE

@@ -18,14 +18,7 @@ NO_TRACK = -1
 
 @dataclass(frozen=True)
 class TrackSize:
-    """The dimensions of a track in plan.
-
-    Attributes
-    ----------
-    spacing_m : float
-        Distance between the two railhead centres.
-    head_width_m : float
-    """
+    """The dimensions of a track in plan; the spacing is that of the two railhead centres."""
 
     spacing_m: float
     head_width_m: float
@@ -33,16 +26,9 @@ class TrackSize:
 
 @dataclass(frozen=True)
 class RailPath:
-    """A rail in plan, sampled about every `STEP_M`.
+    """A rail in plan, (n, 2) metres about every `STEP_M`, with unit normals to the left.
 
-    Attributes
-    ----------
-    xy : (n, 2) array
-        Metres.
-    normal : (n, 2) array
-        Unit vectors to the left.
-    track : int
-        Number of its track; some distortions apply to all rails of a track.
+    Some distortions apply to all rails of a track, whose number it has.
     """
 
     xy: np.ndarray
@@ -52,18 +38,10 @@ class RailPath:
 
 @dataclass(frozen=True)
 class Layout:
-    """Rails to keep, lines to remove, and places to show.
+    """Running rails, distractors, which are other rails and lines, and places to show.
 
-    Attributes
-    ----------
-    rails : tuple of RailPath
-        Running rails.
-    distractors : tuple of RailPath
-        Guard, check and wing rails and other lines that are not running rails.
-    openings : tuple of ((2,) array, float)
-        Centres and widths, metres, of the gaps for wheel flanges where rails cross.
-    spots : tuple of (2,) array
-        Places that a raster should show, metres.
+    Openings are centres and widths, metres, of the gaps for wheel flanges where rails cross; spots are places that a
+    raster should show.
     """
 
     rails: tuple[RailPath, ...] = ()
@@ -88,28 +66,11 @@ def combine(layouts: Iterable[Layout]) -> Layout:
 
 
 def beside(curve: Curve, left_m: float | np.ndarray, track: int = NO_TRACK) -> RailPath:
-    """Lay a rail parallel to a curve, offset along the exact normal.
-
-    Parameters
-    ----------
-    curve : Curve
-    left_m : float or (n,) array
-        Offset to the left.
-    track : int
-        Number of the track.
-    """
+    """Lay a rail parallel to a curve, offset to the left along the exact normal."""
     return RailPath(curve.offset(left_m), curve.left_normal, track)
 
 
 def track(axis: Curve, size: TrackSize, spot: bool = False) -> Layout:
-    """Lay the two rails of a track.
-
-    Parameters
-    ----------
-    axis : Curve
-    size : TrackSize
-    spot : bool
-        Whether the middle of the track is a place that a raster should show.
-    """
+    """Lay the two rails of a track; with `spot`, a raster should show its middle."""
     rails = beside(axis, size.spacing_m / 2, 0), beside(axis, -size.spacing_m / 2, 0)
     return Layout(rails, spots=(axis.xy[len(axis.xy) // 2],) if spot else ())

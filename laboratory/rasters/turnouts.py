@@ -25,16 +25,8 @@ BLADE_LENGTH_M = (5.0, 12.0)
 class TurnoutForm:
     """A turnout, described by its branch: an optional straight switch, an arc, then the leg behind it.
 
-    Attributes
-    ----------
-    name : str
-    radius_m : float
-        Radius of the arc, at the axis of the branch.
-    arc_m : float
-        Length of the arc.
-    switch_m, switch_angle : float
-        Length of the straight switch, and its angle with the main track in radians; 0 where the arc begins at the toe,
-        tangent to the main track.
+    The radius is that of the branch's axis. The angle of the straight switch is in radians; switch and angle are 0
+    where the arc begins at the toe, tangent to the main track.
     """
 
     name: str
@@ -83,24 +75,10 @@ YARD_FORMS = tuple(form for form in FORMS if form.radius_m < 310)
 
 
 def branch(main: Curve, toe_m: float, form: TurnoutForm, hand: int, leg_m: float) -> Curve:
-    """Compute the axis of a turnout's branch.
+    """Compute the axis of a turnout's branch from the toe, at chainage `toe_m` of the main track in facing direction.
 
-    Parameters
-    ----------
-    main : Curve
-        Axis of the through track, in facing direction.
-    toe_m : float
-        Chainage of the toe.
-    form : TurnoutForm
-    hand : int
-        1: the branch leaves to the left; -1: to the right.
-    leg_m : float
-        Length behind the arc, where the branch has the curvature of the main track.
-
-    Returns
-    -------
-    Curve
-        Begins at the toe. A turnout in a curve is bent: the curvature of the main track is added to that of the form.
+    `hand` is 1 where the branch leaves to the left, -1 to the right. A turnout in a curve is bent: the curvature of the
+    main track is added to that of the form, and the `leg_m` behind the arc have it alone.
     """
     toe = int(round(toe_m / main.step_m))
     inherited = float(main.curvature[min(toe, len(main.curvature) - 1)])
@@ -117,19 +95,7 @@ def turnout(
 
     The outer rail of the branch is the bent stock rail and begins at the toe. The inner one is a switch blade, then a
     closure rail that crosses a rail of the main track at the frog. The other blade is a rail of the main track. Spots
-    are the frog and a place between it and the toe.
-
-    Parameters
-    ----------
-    rng : numpy Generator
-    main : Curve
-        Axis of the main track.
-    toe_m : float
-        Chainage of the toe.
-    form : TurnoutForm
-    hand : int
-        1: the branch leaves to the left; -1: to the right.
-    size : TrackSize
+    are the frog and a place between it and the toe. `hand` is that of `branch`.
     """
     side = branch(main, toe_m, form, hand, rng.uniform(15.0, 45.0))
     ahead = main.piece(toe_m, main.length_m)
@@ -149,18 +115,8 @@ def crossover(
 ) -> Layout:
     """Lay a crossover between two parallel tracks: two turnouts of one form that share their branch.
 
-    Parameters
-    ----------
-    rng : numpy Generator
-    axis : Curve
-        Axis to which both tracks are parallel.
-    offsets : tuple of float
-        Offsets of the first and of the second track to its left, metres.
-    at_m : float
-        Chainage of the middle.
-    form : TurnoutForm
-        Its arc is shortened where the tracks are close together; a straight switch is left out.
-    size : TrackSize
+    `offsets` are those of the first and of the second track to the left of the axis, `at_m` the chainage of the middle.
+    The arc of the form is shortened where the tracks are close together; a straight switch is left out.
     """
     apart = abs(offsets[1] - offsets[0])
     hand = 1 if offsets[1] > offsets[0] else -1

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...core.comparison.pieces import cut
+from ...core.comparison.measures import cut
 from ...core.polyline import Chords
 from ...core.rails import RailLine
 
@@ -17,16 +17,10 @@ SAME_RAIL_M = 0.30
 
 @dataclass(frozen=True)
 class Agreement:
-    """Differences between the rails of two surveys, along those of the second; (n,) arrays in metres.
+    """Differences between the rails of two surveys, second minus first, along the second; (n,) arrays in metres.
 
-    Attributes
-    ----------
-    length_m : float
-        What each difference stands for.
-    across_m, height_m : float
-        Second minus first survey; across, positive to the left.
-    sigma_m, sigmaz_m : float
-        Standard errors of these differences, as both surveys state them.
+    Each stands for `length_m`; across, they are positive to the left. `sigma_m` and `sigmaz_m` are their standard
+    errors, as both surveys state them.
     """
 
     length_m: np.ndarray

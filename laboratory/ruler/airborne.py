@@ -11,10 +11,9 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ...core.airborne.files import survey_files
+from ...core.airborne.files import Run, survey_files
 from ...core.airborne.fitting import REASONS, STATION_M
-from ...core.airborne.reading import Run
-from ...core.airborne.survey import SWITCH, AirborneTrack, Guide, Survey
+from ...core.airborne.survey import SWITCH, AirborneSurvey, AirborneTrack, GuideLine
 from ...core.clouds.points import ask
 from ...core.parameters import AirborneParameters
 from ...core.polyline import Polyline
@@ -122,9 +121,9 @@ def compare_stations(
     return Stationwise(seen, across, height, within, beside, flagged, Polyline(truth).t[nearest])
 
 
-def surveyed(scene: FlownScene) -> Survey:
+def surveyed(scene: FlownScene) -> AirborneSurvey:
     """Survey a scene along its guides, from files and back."""
-    guides = [Guide(1 + number, one + ORIGIN[:2]) for number, one in enumerate(scene.guides)]
+    guides = [GuideLine(1 + number, one + ORIGIN[:2]) for number, one in enumerate(scene.guides)]
     parameters = AirborneParameters(GAUGE_M, SPACING_M - GAUGE_M, footprint_m=scene.flight.footprint_m)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -135,12 +134,9 @@ def surveyed(scene: FlownScene) -> Survey:
 def survey_figures(scene: FlownScene) -> dict[str, float]:
     """Survey a scene along its guides, and measure the tracks that are found.
 
-    Returns
-    -------
-    dict of str to float
-        Shares of stations in per cent; errors in millimetres, rms across, and sd of the height; `wrong m`: length that
-        is seen where no track is; `others`: tracks without a guide; `said`: warnings; and, by the names of `UNSEEN`,
-        the number of stations that are not seen.
+    Shares of stations are in per cent; errors in millimetres, rms across, and sd of the height; `wrong m` is the length
+    that is seen where no track is, `others` counts tracks without a guide, `said` warnings, and the names of `UNSEEN`
+    stations that are not seen.
     """
     survey = surveyed(scene)
     pairs = list(zip(survey.tracks, scene.meant))
@@ -163,7 +159,7 @@ def survey_figures(scene: FlownScene) -> dict[str, float]:
     }
 
 
-def compared(survey: Survey, track: AirborneTrack, design: Design, number: int) -> Stationwise:
+def compared(survey: AirborneSurvey, track: AirborneTrack, design: Design, number: int) -> Stationwise:
     """Compare the stations of a track with a true one, except where a train hides it."""
     xyz = survey.frame.to_crs(track.xyz) - ORIGIN
     at_switch = np.array([one == SWITCH for one in track.reason])

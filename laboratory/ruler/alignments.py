@@ -11,10 +11,9 @@ from scipy.special import erf
 
 from ...core.alignment.elements import Alignment, Element, PlanElement, VerticalElement
 from ...core.alignment.fit import fit_track
-from ...core.alignment.held import given_of, noted
-from ...core.alignment.layouts import plan_errors
+from ...core.alignment.layouts import given_of, noted, plan_errors
 from ...core.alignment.noise import Noise
-from ...core.alignment.plane_fit import Points, fit_plan
+from ...core.alignment.plane_fit import MeasuredLine, fit_plan
 from ...core.errors import ParameterError
 from ...core.polyline import Polyline
 from ...core.progress import SILENT, Recording
@@ -75,12 +74,8 @@ class Met:
 class Bound:
     """Least standard errors that any fit can have which is given the types of the elements (Cramér and Rao).
 
-    Attributes
-    ----------
-    radius : (n,) array
-        Of the radii of arcs, as shares.
-    ends_m : (k,) array
-        Of the ends of elements, in the order of `Met.ends_m` if all are found, metres.
+    Those of radii of arcs are shares; those of the ends of elements are in metres, in the order of `Met.ends_m` if all
+    are found.
     """
 
     radius: np.ndarray
@@ -90,17 +85,12 @@ class Bound:
 def bound_of(design: Alignment, line: np.ndarray, white_m: float) -> Bound:
     """Return the least standard errors for a design: the inverse of the information at the true elements.
 
-    Parameters
-    ----------
-    design : Alignment
-    line : (n, 3) array
-        Vertices on the design without errors, local metres.
-    white_m : float
-        Standard deviation of independent errors across, metres.
+    `line`, (n, 3), has vertices on the design without errors; `white_m` is the standard deviation of independent errors
+    across.
     """
     s = Polyline(line).t
     given = given_of(replace(design, plan=tuple(map(noted, design.plan))), 0.0, float(s[-1]))
-    points = Points(line[:, :2], s, np.full(len(s), 1.0 / white_m**2))
+    points = MeasuredLine(line[:, :2], s, np.full(len(s), 1.0 / white_m**2))
     fit = fit_plan(given.chain, points, given.held, poses=given.poses)
     errors = plan_errors(fit, points, white_m, Noise(white_m))
     arcs = np.array([one.type == "arc" for one in fit.elements])
@@ -180,15 +170,12 @@ def _start_scores(true: Sequence[PlanElement], fitted: Sequence[PlanElement]) ->
 def fit_figures(scene: TrackScene) -> dict[str, float]:
     """Fit an alignment to a scene, and measure it.
 
-    Returns
-    -------
-    dict of str to float
-        `found %`: share of the true elements that were found; `elements`: number of those that were fitted; `radius %`
-        and `ends m`: median errors of radii and of ends; `curve mm`: distance of the curve from the true one (rms);
-        `in sigmas`: errors of tangent points in units of their standard errors (rms); `curves`, `ramps` and `ramp m`:
-        parabolas and ramps of cant that were found, and the median error of their ends; `off mm`: distance of the
-        points from the curve (rms); `round`: radii whose proposal is the true one; `said`: number of warnings. Where
-        the track is refused, nothing is found and one thing is said.
+    `found %` is the share of the true elements that were found, `elements` the number of those that were fitted;
+    `radius %` and `ends m` are median errors of radii and of ends; `curve mm` is the distance of the curve from the
+    true one (rms); `in sigmas`, errors of tangent points in units of their standard errors (rms); `curves`, `ramps` and
+    `ramp m`, parabolas and ramps of cant that were found, and the median error of their ends; `off mm`, the distance of
+    the points from the curve (rms); `round`, radii whose proposal is the true one; `said`, the number of warnings.
+    Where the track is refused, nothing is found and one thing is said.
     """
     heard = Recording(SILENT)
     try:

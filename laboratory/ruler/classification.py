@@ -11,7 +11,7 @@ import numpy as np
 
 from ...core.classify.settings import Settings
 from ...core.clouds.points import RailPoints
-from ...core.comparison.pieces import cut
+from ...core.comparison.measures import cut
 from ...core.parameters import Parameters
 from ...core.pipeline import extract_rails
 from ...core.rails import RailNetwork, SearchFigures
@@ -39,8 +39,6 @@ class Score:
 
     Attributes
     ----------
-    scene : str
-    points : int
     recall : float
         Share of the points on heads that are labelled; NaN without any.
     precision : float
@@ -51,7 +49,6 @@ class Score:
         Processor time of the classification.
     peak_mib : float
         Peak memory of the process.
-    figures : SearchFigures
     """
 
     scene: str
@@ -71,21 +68,9 @@ def settings_of(scene: RawScene, weights: Path | None = None) -> Settings:
 
 
 def score(scene: RawScene, wide: bool = False, weights: Path | None = None) -> tuple[Score, np.ndarray]:
-    """Classify a scene and compare the labels with the truth.
+    """Classify a scene, by geometry or by trained weights, and compare the labels, (n,), with the truth.
 
-    Parameters
-    ----------
-    scene : RawScene
-    wide : bool
-        Whether the beam is as wide as a head.
-    weights : Path, optional
-        Weights of a trained network; None means geometry.
-
-    Returns
-    -------
-    Score
-    (n,) bool array
-        The labels.
+    With `wide`, the beam is as wide as a head.
     """
     start = time.process_time()
     found = classify_cloud(scene.xyz, settings_of(scene, weights))

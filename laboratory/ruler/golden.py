@@ -73,19 +73,10 @@ Figures = dict[str, float]
 
 @dataclass(frozen=True)
 class Variant:
-    """One way in which every scene is run.
+    """One way in which every scene is run: a model, an engine, and the scenes that are run so.
 
-    Attributes
-    ----------
-    name : str
-    model : str
-        One of `frpdf.models.NAMES`.
-    seed_shift : int
-        Added to the seed of every scene; even, because odd seeds look from the other side in some.
-    engine : str
-        One of `frpdf.engine`. Every installation has OpenCV.
-    places : tuple of str
-        Scenes that are run so.
+    `seed_shift` is added to the seed of every scene; it is even, because odd seeds look from the other side in some.
+    Every installation has OpenCV.
     """
 
     name: str
@@ -157,12 +148,9 @@ def figures_of(place: str, scene: AnyScene, variant: Variant = PLAIN) -> Figures
 def line_figures(scene: Scene, network: RailNetwork) -> Figures:
     """Measure the lines that were extracted from a scene.
 
-    Returns
-    -------
-    dict of str to float
-        Shares in per cent of lengths within 5 cm; errors in millimetres (rms); `wrong m`: length of rails away from
-        every true one; `fork m`: distance between the places where branches begin and where they truly begin (rms);
-        `bridged m`: length of rails that was drawn without points; `said`: number of warnings.
+    Shares are in per cent of lengths within 5 cm, errors in millimetres (rms); `wrong m` is the length of rails away
+    from every true one, `fork m` the distance between the places where branches begin and where they truly begin (rms),
+    `bridged m` the length of rails that was drawn without points, and `said` the number of warnings.
     """
     rails, tracks = (
         match([scene.frame.to_local(network.frame.to_crs(line.xyz)) for line in lines], truth)
@@ -197,12 +185,8 @@ def _shares_and_errors(prefix: str, found: Match) -> Figures:
 def _fork_error(truth: Sequence[np.ndarray], ends: Sequence[np.ndarray]) -> float:
     """Return by how much the beginnings of branches are off, metres rms; NaN without branches.
 
-    Parameters
-    ----------
-    truth : sequence of (n, 3) array
-        True centerlines; one that begins or ends on another is a branch.
-    ends : sequence of (2, 3) array
-        Ends of the centerlines that were found.
+    A true centerline that begins or ends on another is a branch; `ends`, (2, 3) each, are those of the lines that were
+    found.
     """
     forks = [
         tip[:2]
@@ -243,15 +227,7 @@ def differences(
 
 
 class Golden:
-    """The table on disk.
-
-    Attributes
-    ----------
-    tolerances : dict of str to float
-        How far each figure may move.
-    figures : dict
-        By name of the variant, then of the scene, then of the figure; figures that do not exist are left out.
-    """
+    """The table on disk: by how much each figure may move, and the figures by variant, scene and name."""
 
     def __init__(self, path: Path) -> None:
         """Read the table."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ...core.comparison.pieces import cut
+from ...core.comparison.measures import cut
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,6 @@ class Comparison:
         Offset of the line in plan, positive to the left of the truth.
     height_rmse_m, height_p95_m, height_bias_m : float
         Height of the line above the truth.
-    line_count, truth_count : int
     length_ratio : float
         Length of all lines divided by the length of the truth, in space.
     """
@@ -61,15 +60,7 @@ class Offsets:
 
     @classmethod
     def between(cls, true: np.ndarray, line: np.ndarray, left: np.ndarray, weight: np.ndarray) -> Offsets:
-        """Compute the offsets from true places to places on lines.
-
-        Parameters
-        ----------
-        true, line : (n, 3) array
-        left : (n, 2) array
-            Unit vectors to the left of the true line.
-        weight : (n,) array
-        """
+        """Compute the offsets from true places to places on lines, (n, 3) each; `left` has unit vectors, (n, 2)."""
         step = line - true
         return cls(np.hypot(step[:, 0], step[:, 1]), np.sum(step[:, :2] * left, axis=1), step[:, 2], weight)
 
@@ -84,19 +75,10 @@ class Offsets:
 
 @dataclass(frozen=True)
 class Match:
-    """Offsets between lines and truth, which can be evaluated with any tolerance.
+    """Offsets along the truth, `there`, and along the lines, `back`, which can be evaluated with any tolerance.
 
-    Attributes
-    ----------
-    there, back : Offsets
-        Along the truth, and along the lines.
-    line : (n,) int array
-        Line of each place of `back`.
-    t : (n,) array
-        Plan distance of each place of `back` from the start of its line, metres.
-    line_count, truth_count : int
-    true : (n,) int array
-        Place of `there` that is nearest to each place of `back`; empty without lines or truth.
+    Each place of `back` has its line, its plan distance from the start of this line in metres, and the nearest place of
+    `there`; `true` is empty without lines or truth.
     """
 
     there: Offsets
@@ -142,18 +124,9 @@ class Match:
 def compare_lines(
     extracted: Sequence[np.ndarray], truth: Sequence[np.ndarray], tolerance_m: float = 0.05
 ) -> Comparison:
-    """Compare lines with the truth.
+    """Compare lines with the truth, both (n, 3) metres; a line within the tolerance in plan is taken for the true one.
 
-    Parameters
-    ----------
-    extracted, truth : sequence of (n, 3) array
-        Polylines in metres. Without extracted lines the errors are NaN; without heights, those of height.
-    tolerance_m : float
-        Greatest distance in plan at which a line is taken for the true one.
-
-    Returns
-    -------
-    Comparison
+    Without extracted lines the errors are NaN; without heights, only the errors in height are.
     """
     return match(extracted, truth).within(tolerance_m)
 
@@ -161,10 +134,7 @@ def compare_lines(
 def match(extracted: Sequence[np.ndarray], truth: Sequence[np.ndarray]) -> Match:
     """Find the nearest line for each place of the truth, and the nearest true line for each place of the lines.
 
-    Parameters
-    ----------
-    extracted, truth : sequence of (n, 3) array
-        Polylines in metres. Without truth, all lines are infinitely far from it.
+    Without truth, all lines are infinitely far from it.
     """
     lines, true = cut(extracted), cut(truth)
     if not len(true.start):

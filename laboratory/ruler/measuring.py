@@ -30,23 +30,11 @@ QUALITY_STEP_M = 1.0
 
 @dataclass(frozen=True)
 class Result:
-    """The measurements of one scene.
+    """The measurements of one scene: our lines, and the rails of the plain script, matched with the truth.
 
-    Attributes
-    ----------
-    scene : str
-    rails, centerlines, script : Match
-        Our lines, and the rails of the plain script, compared with the truth.
-    tracks : TrackErrors
-    geometry : GeometryErrors
-    within_sigma, within_two_sigma : float
-        Share of the lateral errors of our rails that do not exceed the standard error there, and twice the standard
-        error.
-    mean_error_m : float
-        Standard error of the mean of the points in the smoothing length, if they are spread evenly across the head.
-    seconds, script_seconds : float
-    peak_mib : float
-        Peak memory up to the end of our extraction.
+    `within_sigma` and `within_two_sigma` are the shares of the lateral errors of our rails up to the standard error
+    there, and up to twice it. `mean_error_m` is the standard error of the mean of the points in the smoothing length,
+    if they are spread evenly across the head, and `peak_mib` the peak memory up to the end of our extraction.
     """
 
     scene: str
@@ -64,14 +52,7 @@ class Result:
 
 
 def measure(scene: Scene, model: str = Parameters.model) -> Result:
-    """Extract the lines of a scene by this project and by the plain script, and compare both with the truth.
-
-    Parameters
-    ----------
-    scene : Scene
-    model : str
-        One of `frpdf.models.NAMES`.
-    """
+    """Extract the lines of a scene by this project and by the plain script, and compare both with the truth."""
     clouds = _through_a_file(scene)
     standard = scene.standard
     start = time.perf_counter()

@@ -33,18 +33,7 @@ AROUND = np.ones((3, 3), dtype=int)
 
 
 def script_lines(points: RailPoints, gauge_m: float, head_width_m: float) -> list:
-    """Extract rail lines with plain methods.
-
-    Parameters
-    ----------
-    points : RailPoints
-    gauge_m, head_width_m : float
-
-    Returns
-    -------
-    list of (n, 3) array
-        Local metres.
-    """
+    """Extract rail lines, (n, 3) local metres, with plain methods."""
     raster = rasterize(points.xyz, cell_size(gauge_m, head_width_m))
     cells = raster.cells()
     corner = cells.min(axis=0) - 2

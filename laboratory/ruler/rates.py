@@ -37,12 +37,8 @@ def bounds(count: int, of: int, confidence: float = 0.95) -> tuple[float, float]
 def mcnemar(first: Sequence[bool], second: Sequence[bool]) -> tuple[int, int, float]:
     """Compare failures of the same worlds in two ways, by McNemar's exact test.
 
-    Returns
-    -------
-    int, int
-        Worlds that fail in the first way alone, and in the second alone.
-    float
-        Chance of a difference as large as this, or larger, if neither way is better.
+    Returns the worlds that fail in the first way alone, those in the second alone, and the chance of a difference at
+    least as large if neither way is better.
 
     >>> mcnemar([True] * 8 + [False] * 2, [False] * 10)
     (8, 0, 0.0078125)

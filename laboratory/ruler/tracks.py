@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...core.comparison.pieces import ASTRAY_M, cut, spacing_and_cant
+from ...core.comparison.measures import ASTRAY_M, cut, spacing_and_cant
 from ...core.polyline import Polyline, project
 from ...core.rails import Centerline, RailLine, TrackGeometry
 
@@ -38,14 +38,7 @@ def compare_tracks(
 ) -> TrackErrors:
     """Compare gauge and cant every `STEP_M` along the centerlines, where lines and truth have both rails.
 
-    Parameters
-    ----------
-    centerlines : sequence of Centerline
-    rails : sequence of RailLine
-        The rails of the centerlines.
-    truth : sequence of (n, 3) array
-        True rails, metres, in the same frame.
-    head_width_m : float
+    True rails, (n, 3), are in the same frame.
     """
     errors = [np.empty((0, 2))]
     for centerline in centerlines:
@@ -68,11 +61,7 @@ def compare_tracks(
 class GeometryErrors:
     """Errors of measured track geometry at its stations, root mean squares; NaN without a true value to compare.
 
-    Attributes
-    ----------
-    gauge_m, cant_m : float
-    radius : float
-        Relative to the true radius, where that is constant and below `CURVED_M`.
+    Errors of the radius are shares of the true one, where that is constant and below `CURVED_M`.
     """
 
     gauge_m: float
@@ -86,15 +75,7 @@ def compare_geometry(
     centerlines: Sequence[np.ndarray],
     head_width_m: float,
 ) -> GeometryErrors:
-    """Compare measured gauge, cant and radius with the truth.
-
-    Parameters
-    ----------
-    geometry : sequence of TrackGeometry
-    rails, centerlines : sequence of (n, 3) array
-        True lines, metres, in the same frame.
-    head_width_m : float
-    """
+    """Compare measured gauge, cant and radius with the truth; true lines, (n, 3), are in the same frame."""
     plain, curved = [np.empty((0, 2))], [np.empty(0)]
     for track in geometry:
         half_m = (np.nanmedian(track.gauge_mm) / 1000 + head_width_m) / 2

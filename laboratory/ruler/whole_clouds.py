@@ -11,8 +11,7 @@ import numpy as np
 from ...core.classify.settings import MARGIN_M, Settings
 from ...core.classify.sharpness import search_alike
 from ...core.classify.square import Classified
-from ...core.grow.heads import OnHeads, Rail
-from ...core.grow.settings import GrowSettings
+from ...core.grow.heads import GrowSettings, OnHeads, Rail
 from ...core.labelling.finding import search_square
 from ...core.progress import SILENT, Progress
 from ...core.rails import SearchFigures
@@ -28,20 +27,10 @@ class Part(NamedTuple):
 
 
 def classify_cloud(xyz: np.ndarray, settings: Settings, progress: Progress = SILENT) -> Classified:
-    """Find the points on railheads in a cloud of any size.
+    """Find the points on railheads in a cloud of any size, (n, 3).
 
-    Parameters
-    ----------
-    xyz : (n, 3) array
-        Metres from the zero of the coordinate system, so that the squares do not depend on how files are cut. With a
-        guide, those that it holds.
-    settings : Settings
-    progress : Progress
-
-    Returns
-    -------
-    Classified
-        Of the whole cloud.
+    Metres count from the zero of the coordinate system, so that the squares do not depend on how files are cut. With a
+    guide, only points near it are given.
     """
     rail = np.zeros(len(xyz), dtype=bool)
     figures = SearchFigures()
@@ -63,14 +52,7 @@ def classify_cloud(xyz: np.ndarray, settings: Settings, progress: Progress = SIL
 
 
 class GrowingCloud:
-    """A cloud in memory in which rails grow.
-
-    Parameters
-    ----------
-    xyz : (n, 3) array
-        Metres from the zero of the coordinate system.
-    settings : GrowSettings
-    """
+    """A cloud in memory, (n, 3) metres from the zero of the coordinate system, in which rails grow."""
 
     def __init__(self, xyz: np.ndarray, settings: GrowSettings) -> None:
         self._squares = Tiling(settings.classification.side_m, MARGIN_M).sort(xyz)

@@ -19,7 +19,7 @@ from scipy.spatial import cKDTree
 from ...core.checks.findings import examine
 from ...core.checks.listing import Finding, list_findings, verdict
 from ...core.clouds.points import ask
-from ...core.comparison.pieces import cut
+from ...core.comparison.measures import cut
 from ...core.errors import RailExtractError
 from ...core.parameters import Parameters
 from ...core.pipeline import extract_files
@@ -63,14 +63,8 @@ MISSING, FALSE, ACROSS, HEIGHT, FEWER, MORE, REFUSED, BROKEN = (
 class Limits:
     """What an extraction must reach.
 
-    Attributes
-    ----------
-    points_per_m : float
-        Points of its head from which a rail is to be found.
-    found : float
-        Least share of the length to be found.
-    across_m, height_m : float
-        Largest root mean square of the errors.
+    A rail is to be found from `points_per_m` points of its head on; `found` is the least share of this length, and
+    `across_m` and `height_m` are the largest root mean squares of the errors.
     """
 
     points_per_m: float
@@ -85,19 +79,10 @@ FROM_ABOVE = Limits(8.0, 0.98, 0.012, 0.008)
 
 @dataclass(frozen=True)
 class Fault:
-    """One reason for which a world fails.
+    """One reason for which a world fails: a figure beyond its limit, or the message of an error.
 
-    Attributes
-    ----------
-    cause : str
-    figure : float
-        The figure that is beyond its limit.
-    xyz : (3,) array or None
-        Place where it is worst; None if there is no result.
-    silent : bool
-        Whether the verdict is good, no finding is near, and the standard error there is at most half the error.
-    words : str
-        Message, of an error.
+    `xyz` is the place where it is worst, None without a result. It is silent if the verdict is good, no finding is
+    near, and the standard error there is at most half the error.
     """
 
     cause: str
@@ -109,20 +94,9 @@ class Fault:
 
 @dataclass(frozen=True)
 class Judged:
-    """An extraction compared with its world.
+    """An extraction compared with its world: its faults, figures by name, and lines matched with the truth.
 
-    Attributes
-    ----------
-    faults : tuple of Fault
-        None if it does not fail.
-    figures : dict
-        By name; for the JSON line.
-    network : RailNetwork or None
-    found : Match or None
-        Lines compared with the truth.
-    shown : (n,) bool array
-        Places of the truth that are to be found.
-    findings : tuple of Finding
+    `shown` says which places of the truth are to be found.
     """
 
     faults: tuple[Fault, ...]

@@ -43,22 +43,9 @@ def strip(
     points_per_m: float,
     noise_m: float = 0.004,
 ) -> np.ndarray:
-    """Draw points of a strip along a track.
+    """Draw points, (n, 3), of a strip along a track, whose middle is `left_m` beside and `up_m` above the track's axis.
 
-    Parameters
-    ----------
-    rng : RandomState
-    track : Track
-    left_m, up_m : float or (n,) array
-        Distance of the middle of the strip to the left of the track's axis, and height above it, at the samples.
-    width_m : float
-    points_per_m : float
-    noise_m : float
-        Standard deviation in each of x, y and z.
-
-    Returns
-    -------
-    (n, 3) array
+    `noise_m` is the standard deviation in each of x, y and z.
     """
     curve, axis = track.curve, track.centerline
     at = rng.randint(len(curve.xy), size=int(points_per_m * curve.length_m))
@@ -101,17 +88,7 @@ def rack(rng: np.random.RandomState, track: Track) -> np.ndarray:
 
 
 def beside(name: str, seed: int, extras: Sequence[Extra], length_m: float = 60.0, radius_m: float = 900.0) -> Scene:
-    """Build a curve next to which other things are classified as rail.
-
-    Parameters
-    ----------
-    name : str
-    seed : int
-    extras : sequence of callable
-        Draw the points of these things.
-    length_m, radius_m : float
-        Length and radius of the curve.
-    """
+    """Build a curve next to which other things, drawn by `extras`, are classified as rail."""
     rng = np.random.RandomState(seed)
     curve = trace([Element(length_m, 1 / radius_m, 1 / radius_m)], heading=0.3 + seed)
     track = Track(curve, spacing(STANDARD), rolling(curve), canted(curve, 0.06))
@@ -188,17 +165,8 @@ def from_the_side(
 ) -> Scene:
     """Build a track that is scanned from the next one only, with the side faces of its rails in the class.
 
-    Parameters
-    ----------
-    name : str
-    seed : int
-    angle_deg : float
-        Angle of the scanner above the horizontal, seen from the track.
-    face_share : float
-        Share of the points on side faces that are classified as rail.
-    noise_m, length_m : float
-    top_share : float
-        The same for the crown.
+    The angle is that of the scanner above the horizontal; the shares are those of points on side faces and on the crown
+    that are classified as rail.
     """
     rng = np.random.RandomState(seed)
     curve = trace([Element(length_m, 1 / 800, 1 / 800)], heading=0.2 * seed)
@@ -232,13 +200,7 @@ def crossing(
 ) -> Scene:
     """Build a road crossing where dirt in the flangeways is classified as rail, and the heads are not.
 
-    Parameters
-    ----------
-    seed : int
-    length_m : float
-    inside_m, depth_m : float
-        Position of the dirt: from the axes of the rails towards the middle of the track, and below their tops.
-    noise_m : float
+    The dirt is `inside_m` from the axes of the rails towards the middle of the track, and `depth_m` below their tops.
     """
     rng = np.random.RandomState(seed)
     curve = trace([Element(70.0, 1 / 1500, 1 / 1500)], heading=0.3 * seed)
@@ -262,15 +224,7 @@ def standing_train(
 ) -> Scene:
     """Build a track on which a train stands, whose wheels, bogies and frames are classified as rail.
 
-    Parameters
-    ----------
-    name : str
-    seed : int
-    head_share : float
-        Share of the points on the heads below the train that the scanner sees, in places half a metre long.
-    length_m : float
-        Length of the train.
-    noise_m : float
+    The scanner sees `head_share` of the points on the heads below the train, in places half a metre long.
     """
     rng = np.random.RandomState(seed)
     curve = trace([Element(110.0, 1 / 2000, 1 / 2000)], heading=0.25 * seed)
@@ -293,15 +247,7 @@ def standing_train(
 
 
 def grooved(seed: int = 42, road_m: float = 0.07, noise_m: float = 0.004) -> Scene:
-    """Build grooved rails with a strip of the road on their outer sides in the class.
-
-    Parameters
-    ----------
-    seed : int
-    road_m : float
-        Width of the road that is classified as rail.
-    noise_m : float
-    """
+    """Build grooved rails with a strip of the road, `road_m` wide, on their outer sides in the class."""
     rng = np.random.RandomState(seed)
     standard = replace(STANDARD, head_width_m=0.056)
     curve = trace([Element(60.0, 1 / 400, 1 / 400)], heading=0.2 * seed)

@@ -26,22 +26,9 @@ WEED_POINTS = (5, 60)
 def weeds(
     rng: np.random.RandomState, lines: Sequence[np.ndarray], count: int, reach_m: float, height_m: tuple[float, float]
 ) -> np.ndarray:
-    """Draw weeds next to lines: round tufts, some narrow, some as wide as a sleeper.
+    """Draw weeds, (n, 3), next to lines at railhead height: round tufts, some narrow, some as wide as a sleeper.
 
-    Parameters
-    ----------
-    rng : RandomState
-    lines : sequence of (n, 3) array
-        Lines at the height of the railheads.
-    count : int
-    reach_m : float
-        Greatest distance from the line in x and in y.
-    height_m : tuple of float
-        Smallest and largest height above the railheads.
-
-    Returns
-    -------
-    (n, 3) array
+    They are up to `reach_m` away in x and in y, and between two heights above the heads.
     """
     roots = _beside(rng, lines, count, reach_m)
     sizes = rng.randint(*WEED_POINTS, size=count)
@@ -54,42 +41,14 @@ def weeds(
 
 
 def stones(rng: np.random.RandomState, lines: Sequence[np.ndarray], count: int, reach_m: float) -> np.ndarray:
-    """Draw single points of ballast and rail feet next to lines.
-
-    Parameters
-    ----------
-    rng : RandomState
-    lines : sequence of (n, 3) array
-        Lines at the height of the railheads.
-    count : int
-    reach_m : float
-        Greatest distance from the line in x and in y.
-
-    Returns
-    -------
-    (count, 3) array
-    """
+    """Draw single points, (count, 3), of ballast and rail feet up to `reach_m` from lines at railhead height."""
     points = _beside(rng, lines, count, reach_m)
     points[:, 2] -= rng.uniform(0.6, 1.1, count) * HEAD_ABOVE_GROUND_M
     return points
 
 
 def ground(rng: np.random.RandomState, centerlines: Sequence[np.ndarray], margin_m: float, step_m: float) -> np.ndarray:
-    """Draw ground points on a jittered grid around the tracks: a flat bed with sloping shoulders.
-
-    Parameters
-    ----------
-    rng : RandomState
-    centerlines : sequence of (n, 3) array
-    margin_m : float
-        Width of the ground beyond the outer tracks.
-    step_m : float
-        Step of the grid.
-
-    Returns
-    -------
-    (n, 3) array
-    """
+    """Draw ground points, (n, 3), on a jittered grid around the tracks: a flat bed with shoulders, `margin_m` wide."""
     axes = np.concatenate(centerlines)
     (left, bottom), (right, top) = axes[:, :2].min(axis=0) - margin_m, axes[:, :2].max(axis=0) + margin_m
     x, y = np.meshgrid(np.arange(left, right, step_m), np.arange(bottom, top, step_m))

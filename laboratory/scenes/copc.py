@@ -18,26 +18,11 @@ INFO_BYTES, ENTRY_BYTES, RECORD_HEADER_BYTES, LATE_HEADER_BYTES = 160, 32, 54, 6
 
 
 def write_copc(cloud: laspy.LasData, path: Path, low: np.ndarray, side_m: float, levels: int) -> tuple[int, int]:
-    """Write a cloud as a COPC file, its points sorted into an octree.
+    """Write a LAS 1.4 cloud, whose records change, as a COPC file, its points sorted into an octree.
 
-    The level of a point is chosen at random, four times as many on each as on the one above, so that the nodes of a
-    flat cloud hold about the same number of points.
-
-    Parameters
-    ----------
-    cloud : LasData
-        LAS 1.4; its records change.
-    path : Path
-    low : (3,) array
-        Corner of the octree with the smallest coordinates.
-    side_m : float
-        Side of the octree, units of the cloud.
-    levels : int
-
-    Returns
-    -------
-    root_at, count : int
-        Position of the only page of the octree in the file, and the number of its entries.
+    The octree has its least corner at `low` and this side, in units of the cloud. The level of a point is chosen at
+    random, four times as many on each as on the one above, so that the nodes of a flat cloud hold about the same number
+    of points. Returns the position of the only page of the octree in the file, and the number of its entries.
     """
     nodes, index = np.unique(_nodes_of(cloud.xyz - low, side_m, levels), axis=0, return_inverse=True)
     cloud.points = cloud.points[np.argsort(index.ravel(), kind="stable")]

@@ -33,16 +33,10 @@ COARSE_SAMPLES = 50
 
 @dataclass(frozen=True)
 class Frog:
-    """A place where a rail crosses a rail of another track.
+    """A place where a rail, +1 the left and -1 the right one, crosses a rail of another track.
 
-    Attributes
-    ----------
-    track, side : int
-        The rail; side is +1 for the left and -1 for the right one.
-    sample : int
-        Sample of the curve of its track.
-    behind : int
-        +1 if the nose follows the crossing of the axes along the curve, -1 if it precedes it.
+    `sample` is that of the curve of its track; `behind` is +1 if the nose follows the crossing of the axes along the
+    curve, -1 if it precedes it.
     """
 
     track: int
@@ -52,22 +46,10 @@ class Frog:
 
 
 def laid_together(tracks: Sequence[Track], clouds: Sequence[np.ndarray], head_width_m: float) -> list[np.ndarray]:
-    """Remove from the points of rails, which were scanned one by one, those that other rails make impossible.
+    """Remove from the points of rails, (n, 3) each by track and side, those that other rails make impossible.
 
-    Where two heads overlap, the later one has no points. Where two rails cross, the flangeway of each is cut through
-    the other.
-
-    Parameters
-    ----------
-    tracks : sequence of Track
-    clouds : sequence of (n, 3) array
-        Points of each running rail, in the order of the tracks and their sides.
-    head_width_m : float
-
-    Returns
-    -------
-    list of (n, 3) array
-        In the same order.
+    The rails were scanned one by one. Where two heads overlap, the later one has no points. Where two rails cross, the
+    flangeway of each is cut through the other.
     """
     clouds = list(clouds)
     rails = _rails(tracks)

@@ -30,19 +30,7 @@ def spacing(standard: RailStandard) -> float:
 
 
 def rolling(curve: Curve, gradient: float = 0.004, wave_m: float = 0.01, wave_length_m: float = 80.0) -> np.ndarray:
-    """Return the heights of a track with a constant gradient and small waves, as settled track has them.
-
-    Parameters
-    ----------
-    curve : Curve
-    gradient : float
-    wave_m, wave_length_m : float
-        Amplitude and length of the waves.
-
-    Returns
-    -------
-    (n,) array
-    """
+    """Return the heights, (n,), of a track with a constant gradient and small waves, as settled track has them."""
     return gradient * curve.chainage + wave_m * np.sin(2 * np.pi * curve.chainage / wave_length_m)
 
 
@@ -55,22 +43,7 @@ def canted(curve: Curve, largest_m: float) -> np.ndarray:
 def random_gaps(
     rng: np.random.RandomState, track: int, length_m: float, count: int, longest_m: float = 3.0
 ) -> dict[tuple[int, int], Gaps]:
-    """Draw sections without points for both rails of a track: one in each of `count` equal parts.
-
-    Parameters
-    ----------
-    rng : RandomState
-    track : int
-        Number of the track.
-    length_m : float
-        Length of the track.
-    count : int
-    longest_m : float
-
-    Returns
-    -------
-    dict of (track, side) to Gaps
-    """
+    """Draw sections without points for both rails of a track: one in each of `count` equal parts."""
     gaps: dict[tuple[int, int], Gaps] = {}
     part_m = (length_m - 2 * WHOLE_ENDS_M) / count
     for side in (1, -1):

@@ -6,16 +6,21 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from ...core.frame import LocalFrame
+from ...core.polyline import Polyline, length_along
 from ...core.standards import RailStandard
 from ..curves import Curve
-from .raw_photogrammetry import GROUND_CLASS, Photogrammetry, Surface, misplaced, survey
+from .raw_photogrammetry import CELL_M, GROUND_CLASS, Photogrammetry, Surface, misplaced, survey
 from .raw_scanner import RawScanner, cast
 from .raw_world import HEAD, SLEEPER_STEP_M, Bedding, World, along_and_left, ways_of
 from .tracks import Track
 
 BALLAST = Bedding()
+
+BLENDED = 4.0
+"""Distance between the axes of two rails, in standard deviations of the blur, from which each has its own ridge."""
 
 Thing = Callable[[World], None]
 
@@ -26,7 +31,6 @@ class RawScene:
 
     Attributes
     ----------
-    name : str
     xyz : (n, 3) array
         Local metres.
     kind : (n,) uint8 array
@@ -34,9 +38,6 @@ class RawScene:
     rails : tuple of (k, 3) array
         Tops of the heads on their own axes.
     centerlines : tuple of (k, 3) array
-    standard : RailStandard
-    frame : LocalFrame
-    other_gauges_m : tuple of float
     crests : tuple of (k, 3) array or None
         Rails as a blunted surface shows them, lower than the tops; None where the cloud shows the tops.
     classification : (n,) uint8 array or None
@@ -106,7 +107,7 @@ def scan_world(
             clouds.append(misplaced(xyz, scanner, own))
             kinds.append(found.kind)
             classes.append(found.classification)
-            crests = tuple(crest(rail, line, found.surface) + scanner.shift_m for rail in rails)
+            crests = tuple(rail + scanner.shift_m for rail in crests_of(rails, line, found.surface, scanner.blur_m))
         else:
             xyz, kind = _scanned(world, scanner)
             clouds.append(xyz)
@@ -155,10 +156,29 @@ def placed(line: Curve, station: np.ndarray, left: np.ndarray, height: np.ndarra
     return np.column_stack([xy + left[:, None] * normal, height])
 
 
+def crests_of(rails: tuple[np.ndarray, ...], line: Curve, surface: Surface, blur_m: float) -> tuple[np.ndarray, ...]:
+    """Lay rails, (k, 3) each, as far below their tops as the blur of a surface lowers them.
+
+    Where another rail is within `BLENDED` of the blur, in a switch, the surface is one ridge of both, higher than
+    either would be alone: what the rail shows on both sides of such a place is interpolated.
+    """
+    reach_m = BLENDED * blur_m
+    lowered = []
+    for number, rail in enumerate(rails):
+        others = [Polyline(other[:, :2]).resampled(CELL_M).xy for other in rails[:number] + rails[number + 1 :]]
+        alone = cKDTree(np.concatenate(others)).query(rail[:, :2])[0] > reach_m
+        shown = crest(rail, line, surface)
+        along = length_along(rail[:, :2])
+        if alone.any():
+            shown[:, 2] = rail[:, 2] + np.interp(along, along[alone], (shown - rail)[alone, 2])
+        lowered.append(shown)
+    return tuple(lowered)
+
+
 def crest(rail: np.ndarray, line: Curve, surface: Surface) -> np.ndarray:
-    """Lay a rail at the height of a surface, (k, 3), as the mean over the distance of two sleepers."""
-    _, chainage, left = along_and_left(line, rail[:, :2])
-    around = chainage + np.linspace(-SLEEPER_STEP_M, SLEEPER_STEP_M, 9)[:, None]
-    around = around.clip(0, line.length_m)
-    height = surface.at(around.ravel(), np.broadcast_to(left, around.shape).ravel()).reshape(around.shape)
+    """Lay a rail at the height of a surface, (k, 3), as the mean over the distance of two sleepers along the rail."""
+    course = Polyline(rail[:, :2])
+    around = (course.t + np.linspace(-SLEEPER_STEP_M, SLEEPER_STEP_M, 9)[:, None]).clip(0, course.length_m)
+    _, chainage, left = along_and_left(line, course.at(around.ravel()))
+    height = surface.at(chainage, left).reshape(around.shape)
     return np.column_stack([rail[:, :2], height.mean(axis=0)])

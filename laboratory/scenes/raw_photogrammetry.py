@@ -98,18 +98,10 @@ class Photogrammetry:
 
 @dataclass(frozen=True)
 class Surface:
-    """The surface that a survey would show without noise.
+    """The surface that a survey would show without noise; (profiles, cells) arrays.
 
-    Attributes
-    ----------
-    sharper, blunter : (profiles, cells) float32 array
-        Heights with the least and with the most blur.
-    kind : (profiles, cells) uint8 array
-        What lies uppermost.
-    classification : (profiles, cells) uint8 array
-    hidden : (profiles, cells) bool array
-    left_m : float
-        Place of the first cell, to the left of the reference line.
+    Heights have the least and the most blur; `kind` is what lies uppermost. `left_m` is the place of the first cell, to
+    the left of the reference line.
     """
 
     sharper: np.ndarray
@@ -136,14 +128,7 @@ class Surface:
 
 @dataclass(frozen=True)
 class Survey:
-    """Points of a survey before they are laid along the reference line.
-
-    Attributes
-    ----------
-    station, left, height : (n,) arrays
-    kind, classification : (n,) uint8 array
-    surface : Surface
-    """
+    """Points of a survey before they are laid along the reference line; (n,) arrays."""
 
     station: np.ndarray
     left: np.ndarray
@@ -227,14 +212,7 @@ def _surface(world: World, camera: Photogrammetry) -> Surface:
 
 
 def from_above(segments: Segments, profiles: int, half_width_m: float) -> tuple[np.ndarray, np.ndarray]:
-    """Height and kind of what lies uppermost in each cell, (profiles, cells) each; cells without anything are filled.
-
-    Parameters
-    ----------
-    segments : Segments
-    profiles : int
-    half_width_m : float
-    """
+    """Height and kind of what lies uppermost in each cell, (profiles, cells) each; empty cells are filled."""
     cells = int(round(2 * half_width_m / CELL_M))
     height, kind = np.full((profiles, cells), np.nan, dtype=np.float32), np.zeros((profiles, cells), dtype=np.uint8)
     borders = np.searchsorted(segments.profile, np.arange(0, profiles + CHUNK, CHUNK))

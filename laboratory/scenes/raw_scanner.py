@@ -81,15 +81,11 @@ class RawScanner:
         return station[station < length_m]
 
     def share_kept(self, ahead_m: np.ndarray, reach_m: np.ndarray) -> np.ndarray:
-        """Share of points that a scanner on a tripod has of those of dense profiles, (n,).
+        """Share of points, (n,), that a scanner on a tripod has of those of dense profiles.
 
         On any surface along the line, rays of a sphere are `reach_m`² / distance³ · profile_step / ray_step as dense as
-        those of the profiles: the solid angle falls with the square of the distance, and the cosine with it.
-
-        Parameters
-        ----------
-        ahead_m, reach_m : (n,) array
-            Distance from the tripod along the line, and in the profile.
+        those of the profiles: the solid angle falls with the square of the distance, and the cosine with it. `ahead_m`
+        is the distance from the tripod along the line, `reach_m` the one in the profile.
         """
         distance_m = np.hypot(ahead_m, reach_m)
         return np.minimum(reach_m**2 * self.profile_step_m / (distance_m**3 * self.ray_step_rad), 1.0)
@@ -97,15 +93,9 @@ class RawScanner:
 
 @dataclass(frozen=True)
 class Segments:
-    """Straight pieces of cross-sections.
+    """Straight pieces of cross-sections, by rising number of their profile.
 
-    Attributes
-    ----------
-    profile : (k,) int array
-        In rising order.
-    start, end : (k, 2) array
-        Metres to the left of the reference line and height.
-    kind : (k,) uint8 array
+    Starts and ends, (k, 2), are metres to the left of the reference line, and height.
     """
 
     profile: np.ndarray
@@ -116,15 +106,7 @@ class Segments:
 
 @dataclass(frozen=True)
 class Hits:
-    """What the rays hit.
-
-    Attributes
-    ----------
-    profile : (n,) int array
-    place : (n, 2) array
-        Metres to the left of the reference line and height, with noise.
-    kind : (n,) uint8 array
-    """
+    """What the rays hit: places, (n, 2) metres to the left of the reference line and height, with noise."""
 
     profile: np.ndarray
     place: np.ndarray

@@ -38,23 +38,10 @@ def with_bar(
     length_m: float = np.inf,
     middle_m: float = 0.0,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Lift points to a straight bar.
+    """Lift points, (n, 3), to a straight bar, and return which are on it.
 
-    Parameters
-    ----------
-    xyz : (n, 3) array
-    width_m : float
-    angle : float
-        Direction, radians.
-    left_m, middle_m : float
-        Place of its middle across the line through `MIDDLE`, and along it.
-    height_m, length_m : float
-
-    Returns
-    -------
-    (n, 3) array
-    (n,) bool array
-        Points on the bar.
+    The angle is in radians; `left_m` and `middle_m` are the place of its middle across the line through `MIDDLE`, and
+    along it.
     """
     along, across = turned(xyz, angle)
     on = (np.abs(across - left_m) <= width_m / 2) & (np.abs(along - middle_m) <= length_m / 2)

@@ -21,14 +21,7 @@ Lefts = Callable[[np.ndarray], np.ndarray]
 
 @dataclass(frozen=True)
 class Strip:
-    """Points of a bed with heads.
-
-    Attributes
-    ----------
-    xyz : (n, 3) array
-    head : (n,) bool array
-    curvature : float
-    """
+    """Points of a bed, (n, 3), and which of them are on heads."""
 
     xyz: np.ndarray
     head: np.ndarray
@@ -54,18 +47,10 @@ def strip(
     noise_m: float = 0.002,
     half_width_m: float = 1.5,
 ) -> Strip:
-    """Lay a strip of ballast with rails along an arc that starts at the origin to the east.
+    """Lay a strip of ballast with rails, a track by default, along an arc that starts at the origin to the east.
 
-    Parameters
-    ----------
-    length_m, curvature : float
-    rails : sequence of Lefts, optional
-        A track by default.
-    hidden : callable, optional
-        Called with places along and the rail's places to the left; says which heads are missing.
-    paved : callable, optional
-        Called with places along; says where the bed is filled to the tops, with grooves inside.
-    per_m2, noise_m, half_width_m : float
+    `hidden` says, from places along and the rail's places to the left, which heads are missing; `paved`, from places
+    along, where the bed is filled to the tops, with grooves inside.
     """
     rng = np.random.RandomState(7)
     count = int(per_m2 * length_m * 2 * half_width_m)

@@ -96,19 +96,9 @@ def plants(
     base_m: float = -0.2,
     leaves: int = 10,
 ) -> None:
-    """Let plants grow: balls of leaves above a base.
+    """Let plants grow in a range across from the reference line: balls of leaves above a base.
 
-    Parameters
-    ----------
-    world : World
-    count : int
-    lefts_m : tuple of float
-        Range across, from the reference line.
-    height_m, radius_m : tuple of float
-    base_m : float
-        Where they root, relative to the rails.
-    leaves : int
-        Leaves in each profile of a plant.
+    They root at `base_m` relative to the rails, and have as many leaves in each of their profiles.
     """
     rng = world.rng
     middle = rng.uniform(0, world.station[-1], count)

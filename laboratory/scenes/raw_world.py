@@ -71,10 +71,8 @@ class Bedding:
         Standard deviation of the ballast's tops.
     terrain_m : float
         Ground beside the bed, below the top of the rails.
-    terrain_roughness_m : float
     slab : bool
         Whether the track lies on concrete, without ballast.
-    sleeper_step_m, sleeper_width_m, sleeper_length_m : float
     heap_m : float
         What the ballast beyond the sleepers' ends is higher than that between them; negative where it has fallen off.
     """
@@ -92,14 +90,10 @@ class Bedding:
 
 @dataclass(frozen=True)
 class Way:
-    """A track in the profiles: NaN where a profile does not cross it.
+    """A track in the profiles, (profiles,) arrays; NaN where a profile does not cross it.
 
-    Attributes
-    ----------
-    left_m, top_m, slope, secant : (profiles,) arrays
-        Place of the axis to the left of the reference line, height of the rails' tops, sine of the tilt of the plane of
-        both rails to the left, and length in the profile of what is 1 m long across the track.
-    spacing_m : float
+    Place of the axis to the left of the reference line, height of the rails' tops, sine of the tilt of the plane of
+    both rails to the left, and length in the profile of what is 1 m long across the track.
     """
 
     left_m: np.ndarray
@@ -111,22 +105,10 @@ class Way:
 
 @dataclass
 class World:
-    """Cross-sections along a reference line, to which things are added.
+    """Cross-sections along a reference line, by chainage, to which things are added.
 
-    Attributes
-    ----------
-    reference : Curve
-    station : (profiles,) array
-        Chainage of each profile.
-    ways : list of Way
-    head_width_m : float
-    bedding : Bedding
-    rng : RandomState
-    half_width_m : float
-    crown : float
-        Height of the crown of the heads as a share of that of new ones: wear makes them flat.
-    shear : float
-        How far a profile lies ahead of its station for each metre to the left.
+    `crown` is the height of the crown of the heads as a share of a new one: wear makes them flat. `shear` is how far a
+    profile lies ahead of its station for each metre to the left.
     """
 
     reference: Curve
@@ -230,18 +212,9 @@ def along_and_left(reference: Curve, xy: np.ndarray) -> tuple[np.ndarray, np.nda
 
 
 def outline(head_width_m: float, crown: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
-    """Outline of a rail from the right end of its foot over the head to the left one; parts that are head.
+    """Outline of a rail from the right end of its foot over the head to the left one, and which parts of it are head.
 
-    Parameters
-    ----------
-    head_width_m, crown : float
-        See `World`.
-
-    Returns
-    -------
-    (m, 2) array
-        Metres across and above the top.
-    (m - 1,) bool array
+    Places, (m, 2), are metres across and above the top; for the crown, see `World`.
     """
     below = _FOOT_AND_WEB[1:] - np.array([0.0, RAIL_HEIGHT_M])
     right = np.concatenate([below, _crown() * np.array([1.0, crown])]) * (head_width_m / 0.072)
@@ -361,18 +334,9 @@ def pavement(
     roughness_m: float = 0.0015,
     lift_m: float = 0.0,
 ) -> None:
-    """Pave profiles up to the top of the rails, with a groove inside each rail.
+    """Pave profiles up to the top of the rails, with a groove, width and depth, inside each rail.
 
-    Parameters
-    ----------
-    world : World
-    where : (profiles,) bool array
-    groove_m : tuple of float
-        Width and depth.
-    gap_m : float
-        Gap at the outer side of the rails.
-    half_width_m : float, optional
-        Of the pavement; the whole section by default.
+    `gap_m` is a gap at the outer side of the rails; without `half_width_m`, the whole section is paved.
     """
     half, head = half_width_m or world.half_width_m, world.head_width_m / 2
     cuts = []

@@ -30,13 +30,7 @@ PROFILE_SAMPLES = 24
 
 @dataclass(frozen=True)
 class Profile:
-    """Shape of a railhead, by default that of a new rail.
-
-    Attributes
-    ----------
-    crown_radius_m, corner_radius_m : float
-        Radii of the running surface and of both corners.
-    """
+    """Shape of a railhead, by default that of a new rail: radii of the running surface and of both corners."""
 
     crown_radius_m: float = CROWN_RADIUS_M
     corner_radius_m: float = CORNER_RADIUS_M
@@ -80,17 +74,8 @@ class Scanner:
 def head_outline(head_width_m: float, profile: Profile = NEW) -> tuple[np.ndarray, np.ndarray]:
     """Return the outline of a railhead in its own frame, from the bottom of the left face to that of the right one.
 
-    Parameters
-    ----------
-    head_width_m : float
-    profile : Profile
-
-    Returns
-    -------
-    outline : (m, 2) array
-        Metres to the left of the axis and above the top (0 or negative).
-    turn : (m,) array
-        Angle between the normal of the surface and the axis, radians, positive to the left.
+    Places, (m, 2), are metres to the left of the axis and above the top, 0 or negative; the angle between the normal of
+    the surface and the axis, (m,), is in radians and positive to the left.
     """
     half, crown_m, corner_m = head_width_m / 2, profile.crown_radius_m, profile.corner_radius_m
     reach = crown_m - corner_m
@@ -129,26 +114,11 @@ def scan(
     missing: tuple[tuple[float, float], ...] = (),
     shape: Profile = NEW,
 ) -> np.ndarray:
-    """Scan one railhead from a passing train.
+    """Scan one railhead, (n, 3) points, from a train that passes along `path`, (k, 3), the axis of its track.
 
     The rays of a profile have equal angles between them. Those that hit the visible side of the outline become points,
     so that density falls with distance, surfaces at a grazing angle get few points, and the far face gets none.
-
-    Parameters
-    ----------
-    head : Railhead
-    head_width_m : float
-    path : (k, 3) array
-        Axis of the track on which the scanner rides, metres.
-    scanner : Scanner
-    rng : RandomState
-    missing : tuple of (start, end)
-        Sections without points, metres along the head.
-    shape : Profile
-
-    Returns
-    -------
-    (n, 3) array
+    Sections that are `missing` have none either, metres along the head.
     """
     stations = _stations(head, scanner, rng, missing)
     source = _scanner_positions(head.top[stations], path, scanner)
@@ -197,12 +167,7 @@ def _hits(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Find where the rays from scanner positions, (`across`, `above`) in the frame of the head, hit its outline.
 
-    Returns
-    -------
-    profile : (n,) int array
-        Number of the scanner position of each hit.
-    position : (n,) array
-        Position along `head_outline`, in samples.
+    Returns the scanner position of each hit, by number, and the place along `head_outline`, in samples.
     """
     # Seen from outside, the angle along a convex outline increases only where the surface faces the scanner.
     angle = np.arctan2(across[:, None] - outline[:, 0], above[:, None] - outline[:, 1])

@@ -31,7 +31,6 @@ class Scene:
 
     Attributes
     ----------
-    name : str
     xyz : (n, 3) array
         All points, local metres.
     classification : (n,) uint8 array
@@ -39,7 +38,6 @@ class Scene:
         Tops of the heads on the axes of the heads, local metres: left and right rail of each track in turn.
     centerlines : tuple of (k, 3) array
         Midlines between the tops.
-    standard : RailStandard
     frame : LocalFrame
         Position of the scene in its coordinate system.
     other_gauges_m : tuple of float
@@ -73,16 +71,8 @@ class Scene:
 class Clutter:
     """Number of points in a scene that are not on rails.
 
-    Attributes
-    ----------
-    weeds_near, weeds_between : int
-        Weeds classified as rail within 0.3 m of rails and within 2 m of tracks.
-    stones : int
-        Points of ballast and rail feet classified as rail.
-    other_weeds : int
-        Weeds that are not classified as rail.
-    ground_step_m : float or None
-        Step of the grid of ground points; None leaves the ground out.
+    Weeds within 0.3 m of rails and within 2 m of tracks, and stones of ballast and rail feet, are classified as rail;
+    other weeds are not. Without a step of their grid, there are no ground points.
     """
 
     weeds_near: int = 0
@@ -100,14 +90,10 @@ class Plan:
     ----------
     tracks : sequence of Track
         A branch follows the track from which it departs.
-    standard : RailStandard
-    scanner : Scanner
     ridden : int
         Track on which the scanner rides.
     gaps : dict of (track, side) to Gaps
         Sections without points; side is +1 for the left rail and -1 for the right one.
-    clutter : Clutter
-    frame : LocalFrame
     other_gauges_m : tuple of float
         See `Scene`.
     shape : Profile
@@ -126,18 +112,7 @@ class Plan:
 
 
 def build(name: str, plan: Plan, rng: np.random.RandomState) -> Scene:
-    """Scan the rails of a plan, with the guard rails at its frogs, and add its clutter.
-
-    Parameters
-    ----------
-    name : str
-    plan : Plan
-    rng : RandomState
-
-    Returns
-    -------
-    Scene
-    """
+    """Scan the rails of a plan, with the guard rails at its frogs, and add its clutter."""
     rails = tuple(rail for track in plan.tracks for rail in track.rails())
     centerlines = tuple(track.thinned(track.centerline) for track in plan.tracks)
     clouds = [(RAIL, points) for points in _scanned(plan, rng)] + _clutter(plan.clutter, rails, centerlines, rng)

@@ -23,16 +23,7 @@ SECOND_TRACK_M = 4.5
 
 @dataclass(frozen=True)
 class Pass:
-    """One pass of the scanner.
-
-    Attributes
-    ----------
-    left_m, up_m : float
-        Error of its position: all its points lie this far to the left and above.
-    start_m, end_m : float
-        The part of the track that it scans.
-    scanner : Scanner
-    """
+    """One pass of the scanner along a part of the track; all its points lie this far to the left and above."""
 
     left_m: float
     up_m: float
@@ -46,17 +37,7 @@ def passes(
 ) -> Scene:
     """Build a curve that is scanned several times; its true lines are those without any error.
 
-    Parameters
-    ----------
-    name : str
-    seed : int
-    of : sequence of Pass
-    with_ids : bool
-        Whether the points state which pass they are of.
-    tracks : int
-        Number of parallel tracks.
-    radius_m : float
-        Radius of the curve.
+    With ids, the points state their pass.
     """
     rng = np.random.RandomState(seed)
     curve = trace(transition_curve(15, 30, 30, 1 / radius_m), heading=0.4 + seed)

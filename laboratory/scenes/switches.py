@@ -20,20 +20,10 @@ FREE_M = 30.0
 
 
 def turnout(name: str, form: str, hand: int, heading: float, seed: int, curvature: float = 0.0) -> Scene:
-    """Build a turnout in plain track.
+    """Build a turnout of one of `turnouts.FORMS` in plain track.
 
-    Parameters
-    ----------
-    name : str
-    form : str
-        Name of one of `turnouts.FORMS`.
-    hand : int
-        1: the branch leaves to the left; -1: to the right.
-    heading : float
-        Direction of the main track, radians.
-    seed : int
-    curvature : float
-        Curvature of the main track, 1/m.
+    The branch leaves to the left with a `hand` of 1 and to the right with -1. The heading of the main track is in
+    radians, its curvature in 1/m.
     """
     rng = np.random.RandomState(seed)
     shape = next(candidate for candidate in FORMS if candidate.name == form)

@@ -20,16 +20,10 @@ MAX_CHORD_M, ROUGH_CHORD_M = 0.5, 0.1
 
 @dataclass(frozen=True)
 class Railhead:
-    """A railhead in space, sampled along the track.
+    """A railhead in space, sampled along the track; (n, 3) arrays.
 
-    Attributes
-    ----------
-    top : (n, 3) array
-        Top of the head, on the axis of the head, metres.
-    axis : (n, 3) array
-        Unit vectors up along the axis of the head.
-    across : (n, 3) array
-        Unit vectors to the left across the head, perpendicular to the axis.
+    The top is on the axis of the head, metres; `axis` has unit vectors up along this axis, and `across` those to the
+    left, perpendicular to it.
     """
 
     top: np.ndarray

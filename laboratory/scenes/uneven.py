@@ -41,14 +41,7 @@ RIDGE_NOISE_M, RIDGE_WANDER_M, RIDGE_WANDER_LENGTH_M = 0.004, 0.004, 6.0
 
 
 def uneven(rng: np.random.RandomState, chainage: np.ndarray) -> np.ndarray:
-    """Draw how far the top of one rail is to the left of its design and above it, (n, 2) metres.
-
-    Parameters
-    ----------
-    rng : RandomState
-    chainage : (n,) array
-        Metres along the track.
-    """
+    """Draw how far the top of one rail is to the left of its design and above it, (n, 2) metres, by chainage."""
     off = np.zeros((len(chainage), 2))
     for column, waves in enumerate((WAVES_ACROSS, WAVES_UP)):
         for amplitude_m, length_m in waves:
@@ -71,18 +64,8 @@ def plain_track(
 ) -> Scene:
     """Build a track of 60 m in a curve of 800 m, said to be of 60E1.
 
-    Parameters
-    ----------
-    name : str
-    seed : int
-    scanner : Scanner
-    rough : bool
-        Whether its rails have waves and welds.
-    shape : Profile
-    true_head_m : float
-        True width of the heads.
-    kept : float
-        Share of the points that the cloud has.
+    Rough rails have waves and welds; `true_head_m` is the true width of the heads, and `kept` the share of the points
+    that the cloud has.
     """
     rng = np.random.RandomState(seed)
     true = replace(STANDARD, head_width_m=true_head_m)

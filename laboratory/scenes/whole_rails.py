@@ -30,14 +30,8 @@ TRAIN_M = 0.5
 def classified(scene: RawScene, share: float = 1.0, train_share: float = 0.0, seed: int = 1) -> Scene:
     """Classify a raw cloud by what its points lie on.
 
-    Parameters
-    ----------
-    scene : RawScene
-    share : float
-        Share of the points on webs and feet that are classified as rail, with all points on heads.
-    train_share : float
-        The same of wheels and bogies on the rails.
-    seed : int
+    With all points on heads, a share of the points on webs and feet is classified as rail, and another one of wheels
+    and bogies on the rails.
     """
     rng = np.random.RandomState(seed)
     chance = rng.random_sample(len(scene.kind))

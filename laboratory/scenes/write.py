@@ -5,20 +5,17 @@ from __future__ import annotations
 import argparse
 import json
 from collections.abc import Sequence
-from datetime import date
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ...core.clouds.crs import parse_crs
-from ...core.clouds.las import laspy
 from ...core.errors import CloudError, ParameterError
 from .catalogue import SCENES
+from .las import write_las
 from .raw import RawScene
 from .scene import Scene
-
-SCALE_M = 0.001
-"""Resolution of the coordinates in the file: a millimetre, as that of scanners."""
 
 TRUTH_DECIMALS = 4
 """Decimals of the coordinates of true lines: a tenth of a millimetre."""
@@ -31,27 +28,11 @@ TONES = np.array(
 ) * np.uint16(256)
 """Colour and intensity of each kind of point, see `raw_world.KINDS`: ballast is dark, railheads are bright."""
 
-MADE = date(2025, 1, 1)
-"""Date in the header of the file, fixed so that the same scene gives the same file."""
-
 
 def write_cloud(scene: Scene, path: Path) -> None:
     """Write a scene as LAS 1.4, compressed if the name ends in .laz."""
-    header = laspy.LasHeader(version="1.4", point_format=6)
-    header.scales = np.full(3, SCALE_M)
-    header.offsets = scene.frame.origin
-    header.creation_date = MADE
-    header.generating_software = "Rail Extract scenes"
-    if scene.frame.crs_wkt:
-        header.add_crs(parse_crs(scene.frame.crs_wkt))
-    cloud = laspy.LasData(header)
-    cloud.x, cloud.y, cloud.z = scene.frame.to_crs(scene.xyz).T
-    cloud.classification = scene.classification
-    if scene.strips is not None:
-        cloud.point_source_id = scene.strips
-    if scene.times is not None:
-        cloud.gps_time = scene.times
-    cloud.write(path)
+    known = {"classification": scene.classification, "point_source_id": scene.strips, "gps_time": scene.times}
+    _write(scene, path, 6, known)
 
 
 def write_raw(scene: RawScene, path: Path) -> None:
@@ -60,28 +41,21 @@ def write_raw(scene: RawScene, path: Path) -> None:
     A survey by images has colours and the classes of a ground filter, but no intensity and no time (format 2); a scan
     has intensities and times (format 6).
     """
-    of_images = scene.classification is not None
-    header = laspy.LasHeader(version="1.4", point_format=2 if of_images else 6)
-    header.scales = np.full(3, SCALE_M)
-    header.offsets = scene.frame.origin
-    header.creation_date = MADE
-    header.generating_software = "Rail Extract scenes"
-    if scene.frame.crs_wkt:
-        header.add_crs(parse_crs(scene.frame.crs_wkt))
-    cloud = laspy.LasData(header)
-    cloud.x, cloud.y, cloud.z = scene.frame.to_crs(scene.xyz).T
-    cloud.return_number = cloud.number_of_returns = np.ones(len(scene.xyz), dtype=np.uint8)
-    tone = TONES[scene.kind]
+    tone, of_images = TONES[scene.kind], scene.classification is not None
+    known: dict[str, Any] = {"return_number": 1, "number_of_returns": 1, "point_source_id": scene.strips}
     if of_images:
-        cloud.classification = scene.classification
-        cloud.red = cloud.green = cloud.blue = tone
+        known.update(classification=scene.classification, red=tone, green=tone, blue=tone)
     else:
-        cloud.classification = np.ones(len(scene.xyz), dtype=np.uint8)
-        cloud.intensity = tone
-        cloud.gps_time = np.arange(len(scene.xyz)) / POINTS_PER_S if scene.times is None else scene.times
-    if scene.strips is not None:
-        cloud.point_source_id = scene.strips
-    cloud.write(path)
+        times = np.arange(len(scene.xyz)) / POINTS_PER_S if scene.times is None else scene.times
+        known.update(classification=1, intensity=tone, gps_time=times)
+    _write(scene, path, 2 if of_images else 6, known)
+
+
+def _write(scene: Scene | RawScene, path: Path, point_format: int, values: dict[str, Any]) -> None:
+    """Write points with those of the values that are known."""
+    known = {name: value for name, value in values.items() if value is not None}
+    xyz, crs, offsets = scene.frame.to_crs(scene.xyz), scene.frame.crs_wkt, scene.frame.origin
+    write_las(path, xyz, crs, offsets=offsets, version="1.4", point_format=point_format, **known)
 
 
 def write_truth(scene: Scene, path: Path) -> None:
@@ -126,12 +100,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> None:
     """Write the chosen scenes, each as a cloud and a file of true lines.
 
-    Raises
-    ------
-    ParameterError
-        A scene is unknown, or a name is given for several scenes.
-    CloudError
-        The folder cannot be written to.
+    Raises ParameterError where a scene is unknown or a name is given for several scenes, CloudError where the folder
+    cannot be written to.
     """
     names: Sequence[str] = args.scenes or tuple(SCENES)
     unknown = [name for name in names if name not in SCENES]

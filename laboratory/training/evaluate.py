@@ -96,15 +96,7 @@ def evaluation_pairs(count: int = COUNT) -> list[Pair]:
 
 
 def evaluate(name: str, cleaner: Cleaner, pairs: list[Pair]) -> Row:
-    """Clean all rasters and add up their counts.
-
-    Parameters
-    ----------
-    name : str
-        For the row of the table.
-    cleaner : Cleaner
-    pairs : list of Pair
-    """
+    """Clean all rasters and add up their counts for a row of the table."""
     total, started = Scores(), time.perf_counter()
     for pair in pairs:
         total += score(cleaner(pair.observed), pair.label)

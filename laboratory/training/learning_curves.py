@@ -12,15 +12,7 @@ MAX_BINS = 100
 
 
 def draw_curves(log: Path, picture: Path) -> None:
-    """Draw loss and F1 of each pass by step, as means over equal numbers of steps.
-
-    Parameters
-    ----------
-    log : Path
-        Written by `train`: columns step, rate, loss_1, ..., f1_1, ..., seconds.
-    picture : Path
-        PNG to write.
-    """
+    """Draw loss and F1 of each pass by step, as means over equal numbers of steps, from a log of `train` as PNG."""
     from matplotlib.figure import Figure
 
     columns = read_log(log)

@@ -15,8 +15,8 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from ...core.frpdf.architecture import BASE, FAST, architecture_of
+from ...core.frpdf.models import load_arrays
 from ...core.frpdf.network import FRPDF, CustomConv2d, ProgressiveCombine2d, Recurrent, StackedConv2d, set_weights
-from ...core.frpdf.weights import load_arrays
 from .gradients import move, train_on_cpu
 
 CHANNELS, KERNEL_RADIUS, DILATIONS = BASE.channels, BASE.kernel_radius, BASE.dilations
@@ -150,17 +150,10 @@ def output_bias(network: Recurrent) -> Tensor:
 
 
 class TrainedNetwork:
-    """A network in the form in which it was trained, in bfloat16, with the weights of a file.
+    """One of `NETWORKS` in the form in which it was trained, in bfloat16, with the weights of an .npz file.
 
     It sees a whole raster with unknown surroundings, as in training. The engines in `core.frpdf` take the surroundings
-    to be empty, and compute only along the rails.
-
-    Parameters
-    ----------
-    name : str
-        One of `NETWORKS`; the weights of "frpdf" decide which architecture it has.
-    weights : Path
-        An .npz file.
+    to be empty, and compute only along the rails. The weights of "frpdf" decide which architecture it has.
     """
 
     def __init__(self, name: str, weights: Path) -> None:
@@ -179,19 +172,9 @@ class TrainedNetwork:
 
     @torch.no_grad()
     def probabilities(self, raster: np.ndarray, state: np.ndarray, number: int) -> np.ndarray:
-        """Run one pass.
+        """Run a pass, by its number from 0, and return the probability of rail, (height, width) float32.
 
-        Parameters
-        ----------
-        raster, state : (height, width) float32 arrays
-            Raster, 0 or 1, and state, as in `network.Recurrent.logits`.
-        number : int
-            Number of the pass, from 0.
-
-        Returns
-        -------
-        (height, width) float32 array
-            Probability of rail.
+        Raster, 0 or 1, and state are those of `network.Recurrent.logits`.
         """
         seen, known = (torch.from_numpy(array)[None, None].to(self._device) for array in (raster, state))
         with torch.autocast(self._device, torch.bfloat16):

@@ -15,10 +15,7 @@ WEIGHT_DECAY = 1e-5
 class Optimizers:
     """Muon and AdamW as one optimizer.
 
-    Parameters
-    ----------
-    network : nn.Module
-        With channels innermost in memory, where a kernel is a matrix without copying.
+    The network has channels innermost in memory, where a kernel is a matrix without copying.
     """
 
     def __init__(self, network: nn.Module) -> None:

@@ -15,13 +15,7 @@ _NEIGHBOURS = np.ones((3, 3), dtype=bool)
 
 @dataclass(frozen=True)
 class Scores:
-    """Counts of cells; they can be added up over rasters.
-
-    Attributes
-    ----------
-    fn, fp, tp : int
-        False negatives, false positives, true positives.
-    """
+    """Counts of cells, false negatives, false positives and true positives, which can be added up over rasters."""
 
     fn: int = 0
     fp: int = 0
@@ -47,14 +41,7 @@ class Scores:
 
 
 def score(found: np.ndarray, label: np.ndarray, tolerance: int = 0) -> Scores:
-    """Count cells.
-
-    Parameters
-    ----------
-    found, label : bool arrays of one shape
-    tolerance : int
-        Distance in cells up to which a cell found and a cell of the label match; 0 is strict.
-    """
+    """Count cells; a cell found and a cell of the label match up to `tolerance` cells apart, where 0 is strict."""
     around_found, around_label = (_grown(cells, tolerance) for cells in (found, label))
     return Scores(
         fn=int(np.count_nonzero(~around_found & label)),
@@ -64,13 +51,9 @@ def score(found: np.ndarray, label: np.ndarray, tolerance: int = 0) -> Scores:
 
 
 def bridged(found: np.ndarray, gap: np.ndarray) -> dict[int, bool]:
-    """Return whether each gap is bridged, by its number.
+    """Return whether each gap is bridged, by its number in an array of cells, where 0 is none.
 
-    Parameters
-    ----------
-    found : bool array
-    gap : int array of the same shape
-        Number of the gap of each cell, 0 for none. Gaps at the border are left out: a part of them is not shown.
+    Gaps at the border are left out: a part of them is not shown.
     """
     cells = np.bincount(gap.ravel())
     met = np.bincount(gap[_grown(found, 1)], minlength=len(cells))

@@ -22,8 +22,8 @@ from torch.nn import functional
 
 from ...core.errors import ParameterError
 from ...core.frpdf import DEFAULT_PASSES, OUTPUT_THRESHOLD, START, STATISTICS
+from ...core.frpdf.models import load_arrays, save_arrays
 from ...core.frpdf.network import PassBatchNorm2d, Recurrent, feedback, set_weights, weights_of
-from ...core.frpdf.weights import load_arrays, save_arrays
 from ..rasters.distortion import Pair
 from ..rasters.pairs import ratio_near, training_pair
 from .gradients import move, train_on_cpu
@@ -74,14 +74,12 @@ class Settings:
         Steps of the whole training.
     rate : float
         Largest learning rate.
-    seed : int
     device : str
         "cpu" or "cuda".
     start : Path, optional
         Weights to start from.
     network : str
         One of `networks.NETWORKS`.
-    passes : int
     ratio : float, optional
         Gauge divided by railhead width, to train a specialized model.
     """
@@ -126,19 +124,9 @@ def run(arguments: argparse.Namespace) -> None:
 
 
 def train(settings: Settings, folder: Path, minutes: float) -> Recurrent | None:
-    """Train up to the last step, or for a number of minutes.
+    """Train up to the last step, or for a number of minutes; None if the time was over before the last step.
 
-    Parameters
-    ----------
-    settings : Settings
-    folder : Path
-        For the checkpoint, from which a training continues, and the log.
-    minutes : float
-
-    Returns
-    -------
-    Recurrent or None
-        None if the time was over before the last step.
+    The folder is for the checkpoint, from which a training continues, and for the log.
     """
     torch.manual_seed(settings.seed)
     network = new_network(settings)
@@ -183,20 +171,7 @@ def learning_rate(step: int, settings: Settings) -> float:
 
 
 def batch(settings: Settings, stream: int, step: int) -> tuple[Tensor, Tensor, Tensor]:
-    """Draw the pairs of a step.
-
-    Parameters
-    ----------
-    settings : Settings
-    stream : int
-        One of the streams of random numbers.
-    step : int
-
-    Returns
-    -------
-    observed, label, weight : (n, 1, side, side) float tensor
-        Rasters, labels and weights of the cells.
-    """
+    """Draw observed rasters, labels and weights of cells, (n, 1, side, side), from a stream of random numbers."""
     rng = np.random.default_rng([settings.seed, stream, step])
     side, count = CROPS[rng.choice(len(CROPS), p=CROP_SHARES)]
     if stream == DATA and step >= (1 - LAST_SHARE) * settings.steps:
@@ -220,14 +195,7 @@ def cell_weights(pair: Pair) -> np.ndarray:
 
 
 def run_passes(network: Recurrent, observed: Tensor, passes: int) -> Iterator[Tensor]:
-    """Run passes in bfloat16 and yield the float logits of each; the caller may compute gradients in between.
-
-    Parameters
-    ----------
-    network : Recurrent
-    observed : (n, 1, height, width) float tensor
-    passes : int
-    """
+    """Run passes in bfloat16 and yield the float logits of each; the caller may compute gradients in between."""
     state = torch.full_like(observed, START)
     for number in range(passes):
         with torch.autocast(observed.device.type, torch.bfloat16):
@@ -237,12 +205,7 @@ def run_passes(network: Recurrent, observed: Tensor, passes: int) -> Iterator[Te
 
 
 def loss_of(logits: Tensor, label: Tensor, weight: Tensor) -> Tensor:
-    """Compute weighted binary cross entropy plus soft Dice: with entropy alone, training starts slowly.
-
-    Parameters
-    ----------
-    logits, label, weight : (n, 1, height, width) float tensors
-    """
+    """Compute weighted binary cross entropy plus soft Dice: with entropy alone, training starts slowly."""
     probability = torch.sigmoid(logits)
     dice = 1 - (2 * (probability * label).sum() + 1) / (probability.sum() + label.sum() + 1)
     return functional.binary_cross_entropy_with_logits(logits, label, weight) * ENTROPY_WEIGHT + dice
@@ -309,10 +272,7 @@ def _plain(settings: Settings) -> dict[str, str]:
 def _resume(path: Path, settings: Settings, network: Recurrent, optimizer: Optimizers) -> int:
     """Load a checkpoint if there is one, and return the number of the next step.
 
-    Raises
-    ------
-    ParameterError
-        It belongs to another training.
+    Raises ParameterError if it belongs to another training.
     """
     if not path.exists():
         return 0

@@ -34,7 +34,8 @@ STRIP_M = {HEADS: (0.05, 0.07), FACES: (0.06, 0.09), WHOLE: (0.08, 0.12)}
 there, but a ridge that is wider than it by the beam, or by the blur of images, on either side."""
 
 RIDGE_M = 0.08
-"""Height of this ridge, of which the flanks are classified with the head: half of what a rail stands out of its bed."""
+"""Height of this ridge below the crest that the survey shows: half of what a rail stands out of its bed. Its flanks are
+classified with the head."""
 
 ASIDE_M = 0.01
 """Largest distance of the middle of such a strip from the axis of its rail."""
@@ -160,9 +161,9 @@ def _in_strips(scene: RawScene, how: Classification, rng: np.random.RandomState)
 def _along(
     scene: RawScene, how: Classification, rng: np.random.RandomState
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Places on the rails, (m, 3), their part of the length of the rail, and whether they are not classified, (m,)."""
+    """Places on the rails, (m, 3), as the cloud shows them, their part of its length, and which have no class."""
     places, shares, gaps = [], [], []
-    for rail in scene.rails:
+    for rail in scene.shown:
         line = Polyline(rail).resampled(STEP_M)
         place, at = line.xyz, line.t
         hidden = np.zeros(len(place), dtype=bool)

@@ -17,14 +17,10 @@ ABOVE_M = 0.01
 
 @dataclass(frozen=True)
 class Laid:
-    """A rail in the profiles; NaN where a profile does not cut it.
+    """A rail in the profiles, (profiles,) arrays; NaN where a profile does not cut it.
 
-    Attributes
-    ----------
-    left_m, top_m, lean : (profiles,) arrays
-        Place of the top, and the turn of the head to the left, radians.
-    side : int
-        +1 if it is the left rail of its track, and -1 if it is the right one.
+    Place of the top, and the turn of the head to the left in radians; `side` is +1 for the left rail of a track and -1
+    for the right one.
     """
 
     left_m: np.ndarray
@@ -46,15 +42,9 @@ def cut(world: World, head: Railhead, side: int = 0) -> Laid:
 
 
 def lay(world: World, tracks: Sequence[Track], where: np.ndarray | None = None) -> None:
-    """Lay the rails of tracks with fastenings, and check and wing rails at their frogs.
+    """Lay the rails of tracks in some profiles with fastenings, and check and wing rails at their frogs.
 
-    Parameters
-    ----------
-    world : World
-    tracks : sequence of Track
-        All run in the direction of the reference line.
-    where : (profiles,) bool array, optional
-        Profiles in which the rails are laid.
+    All tracks run in the direction of the reference line.
     """
     laid = [cut(world, track.railhead(side), side) for track in tracks for side in track.sides]
     for number, one in enumerate(laid):

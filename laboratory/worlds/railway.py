@@ -79,19 +79,9 @@ FREE_M = 12.0
 
 @dataclass(frozen=True)
 class Railway:
-    """Tracks in space.
+    """Tracks in space, all in the direction of the scanner, which rides on the first.
 
-    Attributes
-    ----------
-    family, layout : str
-    standard : RailStandard
-    tracks : tuple of Track
-        The first is ridden by the scanner; all run in its direction.
-    plain : bool
-        Whether all tracks are parallel throughout.
-    other_gauges_m : tuple of float
-    crown : float
-        See `raw_world.World`.
+    They are `plain` if all are parallel throughout; for the crown, see `raw_world.World`.
     """
 
     family: str

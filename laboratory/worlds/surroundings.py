@@ -63,21 +63,10 @@ LEAST_M = 6.0
 
 @dataclass(frozen=True)
 class Surroundings:
-    """What the tracks lie in.
+    """What the tracks lie in: everything that a scanner may see, rails included, and the names of what was built.
 
-    Attributes
-    ----------
-    bed, land : str
-    bedding : Bedding
-    whole : Thing
-        Everything that a scanner may see, rails included.
-    names : tuple of str
-        What was built.
-    half_width_m : float
-    rise : callable
-        Height of the ground above the tops of the rails, metres, by the place to the left of the reference line.
-    paved_m : tuple of float or None
-        Section along the reference line, metres, in which rails are in a pavement.
+    `rise` is the height of the ground above the tops of the rails, by the place to the left of the reference line;
+    `paved_m`, the section along it in which rails are in a pavement, if there is one.
     """
 
     bed: str
@@ -175,7 +164,6 @@ class Terrain:
 
     Attributes
     ----------
-    land : str
     low_m, high_m : float
         Outermost tracks, to the left of the reference line.
     depth_m : float

@@ -52,16 +52,9 @@ Scanning = Union[RawScanner, Photogrammetry]
 
 @dataclass(frozen=True)
 class Survey:
-    """How a world is surveyed.
+    """How a world is surveyed: one of `KINDS`, and a scanner for each pass or for each place of a tripod.
 
-    Attributes
-    ----------
-    kind : str
-        One of `KINDS`.
-    scanners : tuple of RawScanner or Photogrammetry
-        One for each pass, or for each place of a tripod.
-    has_ids, has_times : bool
-        Whether points state their pass, and their time.
+    Points may state their pass and their time.
     """
 
     kind: str
@@ -83,15 +76,8 @@ def draw_kind(seed: int) -> str:
 def draw_survey(seed: int, railway: Railway, half_width_m: float, rise: Callable[[float], float], wide: bool) -> Survey:
     """Draw the survey of a world.
 
-    Parameters
-    ----------
-    seed : int
-    railway : Railway
-    half_width_m : float
-    rise : callable
-        Height of the ground above the rails, by the place to the left: scanners stand on it.
-    wide : bool
-        Whether there is room beside the tracks, as there is not in a tunnel.
+    Scanners stand on the ground, whose height above the rails `rise` gives by the place to the left; with `wide`, there
+    is room beside the tracks, as there is not in a tunnel.
     """
     kind, rng, length_m = draw_kind(seed), stream(seed, "survey"), railway.reference.length_m
     if kind == MOBILE:

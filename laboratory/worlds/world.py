@@ -17,7 +17,7 @@ from .railway import Railway, draw_railway
 from .surroundings import TUNNEL, Surroundings, draw_surroundings
 from .surveys import Survey, draw_kind, draw_survey, marked
 
-VERSION = 8
+VERSION = 9
 """Changes when a seed gives another world: results of different versions are never mixed."""
 
 RAW, CLASSIFIED = "raw", "classified"
@@ -27,18 +27,7 @@ CLOUDS = (RAW, CLASSIFIED)
 
 @dataclass(frozen=True)
 class World:
-    """A world and its cloud.
-
-    Attributes
-    ----------
-    seed : int
-    railway : Railway
-    surroundings : Surroundings
-    survey : Survey
-    scene : RawScene
-    classification : Classification or None
-        None of a raw cloud.
-    """
+    """A world and its cloud, which is raw without a classification."""
 
     seed: int
     railway: Railway
@@ -92,14 +81,7 @@ class World:
 
 
 def make(seed: int, cloud: str = RAW) -> World:
-    """Make the world of a seed.
-
-    Parameters
-    ----------
-    seed : int
-    cloud : str
-        One of `CLOUDS`: the world is the same, and raw or classified.
-    """
+    """Make the world of a seed, with one of `CLOUDS`: it is the same, and raw or classified."""
     railway = draw_railway(seed)
     around = draw_surroundings(seed, railway, draw_kind(seed))
     survey = draw_survey(seed, railway, around.half_width_m, around.rise, around.land != TUNNEL)

@@ -83,23 +83,12 @@ class RailAlgorithm(QgsProcessingAlgorithm):
     def read(self, values: ParameterValues) -> Any:
         """Read and check the parameters in the main thread, and return what `compute` needs.
 
-        Raises
-        ------
-        RailExtractError
-            A value is wrong or contradicts another.
+        Raises RailExtractError if a value is wrong or contradicts another.
         """
         raise NotImplementedError
 
     def compute(self, job: Any, values: ParameterValues, progress: Progress) -> dict[str, Any]:
-        """Compute, write the outputs and return the results by name.
-
-        Parameters
-        ----------
-        job : object
-            What `read` returned.
-        values : ParameterValues
-        progress : Progress
-        """
+        """Compute from what `read` returned, write the outputs and return the results by name."""
         raise NotImplementedError
 
     def checkParameterValues(self, parameters: dict[str, Any], context: QgsProcessingContext) -> tuple[bool, str]:

@@ -27,12 +27,7 @@ COMMAND_LINE = "qgis_process"
 def sentence_for(error: BaseException, definitions: Sequence[QgsProcessingParameterDefinition]) -> str:
     """Return the sentence that a user reads about an error; the traceback of an unforeseen one goes into the log.
 
-    Parameters
-    ----------
-    error : BaseException
-        Some libraries raise errors that are not an `Exception`: lazrs raises one on damaged files.
-    definitions : sequence of QgsProcessingParameterDefinition
-        Parameters that the sentence may name.
+    Some libraries raise errors that are not an `Exception`: lazrs raises one on damaged files.
     """
     if isinstance(error, RailExtractError):
         return for_user(str(error), definitions)

@@ -20,16 +20,8 @@ from .parameter_values import ParameterValues
 def check_values(definitions: Sequence[QgsProcessingParameterDefinition], values: ParameterValues) -> None:
     """Check the values of the parameters that several algorithms share; gauges are checked where they are read.
 
-    Parameters
-    ----------
-    definitions : sequence of QgsProcessingParameterDefinition
-        The algorithm's parameters.
-    values : ParameterValues
-
-    Raises
-    ------
-    RailExtractError
-        A number is NaN, EXTENT has no area, RAIL_CLASSES is not a list of classes, or ENGINE cannot run on DEVICE.
+    Raises RailExtractError if a number is NaN, EXTENT has no area, RAIL_CLASSES is not a list of classes, or ENGINE
+    cannot run on DEVICE.
     """
     names = {definition.name() for definition in definitions}
     for one in values.job.parameters:
@@ -48,14 +40,7 @@ def explain_invalid(
 ) -> str | None:
     """Return what is wrong with a value and what to enter instead, or None if QGIS accepts the value.
 
-    Parameters
-    ----------
-    parameter : Parameter
-        What the definition is made for.
-    definition : QgsProcessingParameterDefinition
-    value : object
-        As the user entered it; None means the default.
-    context : QgsProcessingContext
+    A value of None means the default.
     """
     given = definition.defaultValue() if value is None else value
     if definition.checkValueIsAcceptable(given, context) and not _is_no_number(definition, given):

@@ -22,13 +22,7 @@ WIDGET = {"widget_wrapper": {"class": f"{__package__}.cloud_widget.CloudWidgetWr
 
 
 class CloudParameter(QgsProcessingParameterPointCloudLayer):
-    """A point cloud layer or a path, with a widget of its own.
-
-    Parameters
-    ----------
-    name, description : str
-    optional : bool
-    """
+    """A point cloud layer or a path, with a widget of its own."""
 
     def __init__(self, name: str, description: str, optional: bool = False) -> None:
         super().__init__(name, description, None, optional)

@@ -29,13 +29,7 @@ MODEL_OUTPUTS = ["outputPointCloud", "outputLayer", "outputFile", "outputFolder"
 
 
 class CloudWidget(QWidget):
-    """Takes a value from a list, or a path.
-
-    Parameters
-    ----------
-    choices : callable
-        Returns the names and values of the list.
-    """
+    """Takes a value from a list of names and values, or a path."""
 
     changed = pyqtSignal()
 

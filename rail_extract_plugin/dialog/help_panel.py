@@ -33,18 +33,9 @@ PAGES = {
 def help_panel(summary: str, picture: Path | None, text: str, definitions: Definitions, pages: Sequence[str]) -> str:
     """Return the help panel as HTML; QGIS turns each line into a paragraph.
 
-    Advanced parameters are explained by their tooltips and by the guide.
-
-    Parameters
-    ----------
-    summary, text : str
-        What the algorithm does, in one sentence and in detail.
-    picture : Path or None
-        SVG file, shown at its nominal size.
-    definitions : sequence of QgsProcessingParameterDefinition
-        Parameters of the dialog, with their help.
-    pages : sequence of str
-        Pages of the guide to link to, of `PAGES`.
+    It has what the algorithm does, in one sentence and in detail, an SVG picture at its nominal size, the parameters
+    with their help, and links to pages of the guide, of `PAGES`. Advanced parameters are explained by their tooltips
+    and by the guide.
     """
     image = [f'<img src="{picture.as_uri()}">'] if picture else []
     prose = [escape(with_labels(line, definitions), quote=False) for line in text.split("\n") if line]

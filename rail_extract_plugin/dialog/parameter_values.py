@@ -47,19 +47,9 @@ TYPES_WITHOUT_LINES = (
 
 
 class ParameterValues(Values):
-    """Values of the parameters of one run.
+    """Values of the parameters of one run, by name, as QGIS passes them.
 
-    Parameters
-    ----------
-    algorithm : QgsProcessingAlgorithm
-    parameters : dict
-        Values by name, as QGIS passes them.
-    context : QgsProcessingContext
-
-    Attributes
-    ----------
-    algorithm, parameters, context
-        As given, for the functions that write outputs.
+    Algorithm, parameters and context are kept for the functions that write outputs.
     """
 
     def __init__(
@@ -92,10 +82,7 @@ class ParameterValues(Values):
     def open_sources(self) -> None:
         """Find the clouds and open the layers, in the main thread.
 
-        Raises
-        ------
-        RailExtractError
-            One can't be read, has no lines where lines are needed, or has them in degrees.
+        Raises RailExtractError if one can't be read, has no lines where lines are needed, or has them in degrees.
         """
         for one in self.job.parameters:
             if isinstance(one, kinds.Cloud) and self.filled(one.name):
@@ -155,10 +142,8 @@ class ParameterValues(Values):
     def source(self, name: str) -> LayerSource:
         """Return a vector layer or a table.
 
-        Raises
-        ------
-        RailExtractError
-            It can't be read, has no lines where only these are of use, or has them in degrees where they are measured.
+        Raises RailExtractError if it can't be read, has no lines where only these are of use, or has them in degrees
+        where they are measured.
         """
         return self.once(name, lambda: self._source(name))
 
@@ -206,10 +191,7 @@ class ParameterValues(Values):
     def projected_crs(self) -> QgsCoordinateReferenceSystem:
         """Return the coordinate system CRS, an invalid one if it is empty.
 
-        Raises
-        ------
-        ParameterError
-            It is not a coordinate system, or it is in degrees.
+        Raises ParameterError if it is not a coordinate system, or is in degrees.
         """
         crs = self.read_as("Crs", "CRS")
         if self.filled("CRS") and not crs.isValid():
@@ -223,10 +205,7 @@ class ParameterValues(Values):
     def extent(self, crs_wkt: str | None) -> Bounds | None:
         """Read EXTENT in a coordinate system: west, south, east and north limits.
 
-        Raises
-        ------
-        ParameterError
-            The extent has no area, or an infinite one.
+        Raises ParameterError if the extent has no area, or an infinite one.
         """
         if not self.filled("EXTENT"):
             return None

@@ -32,13 +32,8 @@ def for_user(sentence: str, definitions: Definitions) -> str:
 def with_labels(sentence: str, definitions: Definitions, about: str = "") -> str:
     """Replace the names of parameters with their labels, and the ids of choices with their words, both in quotes.
 
-    Parameters
-    ----------
-    sentence : str
-    definitions : sequence of QgsProcessingParameterDefinition
-    about : str
-        Parameter that the sentence is about. An id is a choice of the one that was named last, or of this one; without
-        either it is a word as any other, such as CPU.
+    An id is a choice of the parameter that was named last, or of the one that the sentence is about; without either it
+    is a word as any other, such as CPU.
     """
     labels = {definition.name(): definition.description() for definition in definitions}
     named = about

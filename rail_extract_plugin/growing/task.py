@@ -27,15 +27,9 @@ CLASSIFIED = (
 
 @dataclass(frozen=True)
 class Shown:
-    """What grew from a seed, in the coordinate system of the cloud.
+    """What grew from a seed, in the coordinate system of the cloud: rails, (k, 2) each, and both ends of its own rail.
 
-    Attributes
-    ----------
-    rails : tuple of (k, 2) array
-    ends : tuple of (2,) array
-        Both ends of the rail of the seed.
-    text : str
-        How far it goes and why it ends; or why there is none.
+    The text says how far it goes and why it ends; or why there is none.
     """
 
     rails: tuple[np.ndarray, ...] = ()
@@ -44,16 +38,9 @@ class Shown:
 
 
 class GrowTask(QgsTask):
-    """Follows the rail at a place, in a thread of QGIS.
+    """Follows the rail at a place, in the coordinate system of the cloud, in a thread of QGIS.
 
-    Parameters
-    ----------
-    cloud : CloudSource
-    standard : RailStandard
-    seed : QgsPointXY
-        In the coordinate system of the cloud.
-    done : callable
-        Called in the main thread with what grew; not if the task was cancelled.
+    `done` is called in the main thread with what grew; not if the task was cancelled.
     """
 
     def __init__(
@@ -83,7 +70,7 @@ class GrowTask(QgsTask):
         import numpy as np
 
         from ...core.clouds.points import ask
-        from ...core.grow.settings import GrowSettings
+        from ...core.grow.heads import GrowSettings
         from ...core.kernels import blas, one_thread
         from ...core.labelling.growing import described, grow_all
 
@@ -110,10 +97,7 @@ class GrowTask(QgsTask):
 def has_rail_points(cloud: CloudSource) -> bool:
     """Return whether some of the first points of a cloud have the class of rail points; takes less than a second.
 
-    Raises
-    ------
-    CloudError
-        The file is damaged.
+    Raises CloudError if the file is damaged.
     """
     from ...core.clouds.readers import first_header, read_points
     from ...core.progress import SILENT

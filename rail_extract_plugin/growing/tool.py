@@ -57,15 +57,7 @@ CLOUD_WIDTH = 320
 
 @dataclass
 class Seed:
-    """A click, and what is drawn for it.
-
-    Attributes
-    ----------
-    place : QgsPointXY
-    crs : QgsCoordinateReferenceSystem
-        That of the place: the layer's.
-    bands : list of QgsRubberBand
-    """
+    """A click in the layer's coordinate system, and what is drawn for it."""
 
     place: QgsPointXY
     crs: QgsCoordinateReferenceSystem
@@ -73,15 +65,7 @@ class Seed:
 
 
 class ClickTool(QgsMapTool):
-    """Reports clicks on the map, and the keys for undo and accept.
-
-    Parameters
-    ----------
-    canvas : QgsMapCanvas
-    clicked : callable
-        Called with a place in the coordinate system of the map.
-    undo, accept : callable
-    """
+    """Reports clicks on the map, in its coordinate system, and the keys for undo and accept."""
 
     def __init__(
         self,
@@ -114,14 +98,7 @@ class ClickTool(QgsMapTool):
 
 
 class GrowRails(QObject):
-    """Grows rails from clicks on a point cloud layer.
-
-    Parameters
-    ----------
-    canvas : QgsMapCanvas
-    messages : QgsMessageBar
-    parent : QWidget
-    """
+    """Grows rails from clicks on a point cloud layer."""
 
     def __init__(
         self,
@@ -246,10 +223,7 @@ class GrowRails(QObject):
     def _chosen_cloud(self) -> str | None:
         """Return the layer or the path to grow in; None if the user was asked for a file and chose none.
 
-        Raises
-        ------
-        RailExtractError
-            There are several clouds, seeds of another cloud wait, or packages are missing.
+        Raises RailExtractError if there are several clouds, seeds of another cloud wait, or packages are missing.
         """
         missing = missing_packages(JOB.needs)
         if missing:

@@ -16,25 +16,17 @@ from qgis.core import (
     QgsProperty,
 )
 
+from ...core.disk import scratch_folder, sweep
 from ...core.errors import CloudError
 from ...core.jobs.clouds import CloudSource
-from ...core.scratch import scratch_folder, sweep
 
 
 def cloud_source(value: Any, context: QgsProcessingContext) -> CloudSource:
     """Find the files that the value of a point cloud parameter stands for.
 
-    Parameters
-    ----------
-    value : QgsPointCloudLayer, QgsProperty or str
-        A layer, the name or id of a loaded layer, or the path of a file, a folder or a virtual point cloud.
-    context : QgsProcessingContext
-
-    Raises
-    ------
-    CloudError
-        The layer is not a point cloud, the path is not one of a cloud on this computer, or the layer shows other points
-        or another coordinate system than its file, which is what a run reads.
+    It may be a layer, its name or id, or the path of a file, a folder or a virtual point cloud. Raises CloudError if
+    the layer is not a point cloud, the path is not one of a cloud on this computer, or the layer shows other points or
+    another coordinate system than its file, which is what a run reads.
     """
     if isinstance(value, QgsProperty):
         value = value.valueAsString(context.expressionContext())[0]

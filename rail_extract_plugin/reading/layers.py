@@ -26,7 +26,7 @@ from qgis.core import (
 from ...core.clouds.crs import unit_in_plan
 from ...core.errors import CrsError, ParameterError
 from ...core.jobs.declaration import LINE, POINT, POLYGON
-from ...core.jobs.features import Feature, Source
+from ...core.jobs.features import Feature, FeatureSource
 from ..systems import system
 
 CHORD_TOLERANCE_M = 0.0005
@@ -49,20 +49,8 @@ KINDS = {
 }
 
 
-class LayerSource(Source):
-    """A layer that an algorithm was given.
-
-    Parameters
-    ----------
-    name : str
-        Of its parameter.
-    source : QgsProcessingFeatureSource
-    context : QgsProcessingContext
-
-    Attributes
-    ----------
-    source : QgsProcessingFeatureSource
-    """
+class LayerSource(FeatureSource):
+    """A layer that an algorithm was given for the parameter of this name."""
 
     def __init__(self, name: str, source: QgsProcessingFeatureSource, context: QgsProcessingContext) -> None:
         self.name, self.source, self._context = name, source, context
@@ -116,14 +104,10 @@ class Row(Mapping[str, Any]):
         self._feature = feature
 
     def __getitem__(self, name: str) -> Any:
-        """Return the value of a field.
+        """Return the value of a field; raises KeyError if there is no such field.
 
-        Raises
-        ------
-        KeyError
-            There is no such field.
-        ParameterError
-            QGIS drops the values of the field, as it does where GeoJSON has both whole numbers and texts in one.
+        Raises ParameterError if QGIS drops the values of the field, as it does where GeoJSON has both whole numbers and
+        texts in one.
         """
         index = self._feature.fields().lookupField(name)
         if index < 0:
@@ -152,10 +136,7 @@ def read_place(
 ) -> np.ndarray:
     """Return a place in the coordinate system of the cloud, (1, 2); `own` is that of the place.
 
-    Raises
-    ------
-    CrsError
-        It can't be transformed.
+    Raises CrsError if it can't be transformed.
     """
     shape = QgsGeometry.fromPointXY(place)
     if not transform(shape, QgsCoordinateTransform(own, crs, context.transformContext())):

@@ -10,8 +10,7 @@ from pathlib import Path
 import numpy as np
 from osgeo import gdal
 
-from ...core.files.rail_rasters import Block, RasterFile
-from ...core.files.raster_file import BLOCK
+from ...core.files.rail_rasters import BLOCK, Block, RasterFile
 
 
 @contextmanager

@@ -42,12 +42,7 @@ KEYS = {"previous": "P", "next": "N", ACCEPTED: "A", REJECTED: "R"}
 
 
 class ReviewDock(QDockWidget):
-    """Shows the findings of a layer and writes the user's decisions into it.
-
-    Parameters
-    ----------
-    iface : qgis.gui.QgisInterface
-    """
+    """Shows the findings of a layer and writes the user's decisions into it."""
 
     def __init__(self, iface) -> None:
         super().__init__("Rail Extract review", iface.mainWindow())

@@ -31,12 +31,7 @@ def is_findings(layer) -> bool:
 
 @dataclass(frozen=True)
 class Review:
-    """A finding in the dock.
-
-    Attributes
-    ----------
-    feature : QgsFeature
-    """
+    """A finding in the dock."""
 
     feature: QgsFeature
 

@@ -38,17 +38,7 @@ HEADS, HEADS_HIGH = 3.0, 1.6
 
 @dataclass(frozen=True)
 class Panel:
-    """A part of a section and where it is drawn.
-
-    Attributes
-    ----------
-    box : QRectF
-    right, up : float
-        Middle, metres.
-    width_m, height_m : float
-        What is seen at least.
-    title : str
-    """
+    """A part of a section and where it is drawn: its middle and the least that is seen of it, metres."""
 
     box: QRectF
     right: float

@@ -60,18 +60,9 @@ class Rail:
 class Picture:
     """What a cross-section shows, metres to the right and up as seen along the track.
 
-    Attributes
-    ----------
-    points : (n, 2) array or None
-        None until they are read.
-    rails : (k, 2) array
-    missing : (k,) bool array
-        Whether a rail has no points here: it is where the line is drawn, or opposite to the other one.
-    head_width_m : float
-    note : str
-        What is missing, and why.
-    mark : (2,) array or None
-        The worst place of an object inside a profile, whose whole cross-section is shown.
+    Points are None until they are read. A rail that is missing has no points here: it is where the line is drawn, or
+    opposite to the other one. The note says what is missing, and why. The mark is the worst place of an object inside a
+    profile, whose whole cross-section is shown.
     """
 
     points: np.ndarray | None
@@ -83,13 +74,7 @@ class Picture:
 
 
 class Sections:
-    """The cross-sections of a layer of findings.
-
-    Parameters
-    ----------
-    layer : QgsVectorLayer
-    found : sequence of Review
-    """
+    """The cross-sections of a layer of findings."""
 
     def __init__(self, layer: QgsVectorLayer, found: Sequence[Review]) -> None:
         self.cloud = cloud_of(layer)
@@ -189,12 +174,7 @@ class Sections:
 class ReadingTask(QgsTask):
     """Reads the points of all sections from the cloud, in a thread of QGIS.
 
-    Parameters
-    ----------
-    cloud : RunCloud
-    places : mapping of int to (3,) array
-    done : callable
-        Called in the main thread with the points by id, and with a sentence if they could not be read.
+    `done` is called in the main thread with the points by id, and with a sentence if they could not be read.
     """
 
     def __init__(

@@ -13,12 +13,7 @@ WIDTH_PX = 240
 
 
 class PictureFitter(QObject):
-    """Keeps pictures within the width of the help, which then needs no horizontal scroll bar.
-
-    Parameters
-    ----------
-    browser : QTextBrowser
-    """
+    """Keeps pictures within the width of the help, which then needs no horizontal scroll bar."""
 
     def __init__(self, browser: QTextBrowser) -> None:
         super().__init__(browser)

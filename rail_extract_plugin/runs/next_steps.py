@@ -48,15 +48,9 @@ FOLLOWING = {
 
 
 def after_failure(dialog: RunDialog, failure: type | None, standard: str) -> Iterator[Step]:
-    """Yield what may help after a run that failed.
+    """Yield what may help after a run that failed with an error of this class.
 
-    Parameters
-    ----------
-    dialog : RunDialog
-    failure : type or None
-        Class of the error.
-    standard : str
-        Name of a rail standard that fits the points better; empty if there is none.
+    The standard fits the points better; it is empty if none does.
     """
     yield from _with_other_standard(dialog, standard)
     if failure is UnclassifiedError and "CLASSIFY" in dialog.mainWidget().wrappers:

@@ -56,13 +56,7 @@ def limited(given: dict[str, Any], outputs: Sequence[str], extent: str) -> dict[
 
 
 def visible_part(value: Any, canvas: QgsMapCanvas) -> str:
-    """Return the extent to try of the cloud that a parameter names.
-
-    Raises
-    ------
-    CloudError
-        The value is not a cloud.
-    """
+    """Return the extent to try of the cloud that a parameter names; raises CloudError if it names none."""
     from ...core.clouds.points import ask
 
     layer = QgsProject.instance().mapLayer(value) if isinstance(value, str) else None

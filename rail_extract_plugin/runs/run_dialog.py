@@ -54,15 +54,7 @@ EXTRACT = "extractrails"
 class RunDialog(AlgorithmDialog):
     """Opens on an algorithm of the plugin.
 
-    Parameters
-    ----------
-    algorithm : QgsProcessingAlgorithm
-    parent : QWidget, optional
-
-    Attributes
-    ----------
-    given : dict of str to object
-        Values of the run that this one goes on with, also for parameters that only later steps have.
+    `given` has the values of the run that this one goes on with, also for parameters that only later steps have.
     """
 
     def __init__(self, algorithm: QgsProcessingAlgorithm, parent: QWidget | None = None) -> None:

@@ -37,12 +37,8 @@ def running(feedback: QgsProcessingFeedback) -> Iterator[None]:
 def stop_all(kind: type[QgsProcessingAlgorithm]) -> None:
     """Cancel all runs and tasks of the plugin, wait for their ends, then close its dialogs; in the main thread.
 
-    A dialog that stays open would use the provider, which is deleted when the plugin is unloaded.
-
-    Parameters
-    ----------
-    kind : type
-        Base of the plugin's algorithms.
+    A dialog that stays open would use the provider, which is deleted when the plugin is unloaded. `kind` is the base of
+    the plugin's algorithms.
     """
     tasks = [task for task in QgsApplication.taskManager().activeTasks() if _is_own(task)]
     for one in (*_running, *tasks):

@@ -40,15 +40,7 @@ INSTALL = "installpackages"
 def missing_packages(needs: tuple[tuple[str, ...], ...]) -> tuple[Package, ...]:
     """Find out which packages are missing, without importing modules.
 
-    Parameters
-    ----------
-    needs : tuple of tuple of str
-        Modules of `PACKAGES`; any one module of an inner tuple is enough.
-
-    Returns
-    -------
-    tuple of Package
-        The first module of each inner tuple of which none is installed.
+    Any one module of an inner tuple is enough; if none is installed, the first one is missing.
     """
     unmet = {modules[0] for modules in needs if not any(map(is_installed, modules))}
     return tuple(package for package in PACKAGES if package.module in unmet)
@@ -63,16 +55,7 @@ def is_installed(module: str) -> bool:
 
 
 def explain_missing(label: str, packages: Sequence[Package], usable: Sequence[str]) -> str:
-    """Return a message: which packages an algorithm lacks, the remedy, and which algorithms work without them.
-
-    Parameters
-    ----------
-    label : str
-        Label of the algorithm.
-    packages : sequence of Package
-    usable : sequence of str
-        Labels of the algorithms whose packages are all installed.
-    """
+    """Return a message: which packages an algorithm lacks, the remedy, and which algorithms work without them."""
     names = ", ".join(package.module for package in packages)
     nouns = "Python package" if len(packages) == 1 else "Python packages"
     verb, them = "works" if len(usable) == 1 else "work", "it" if len(packages) == 1 else "them"

@@ -13,9 +13,9 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+from ...core.disk import scratch_folder, sweep
 from ...core.errors import RailExtractError
 from ...core.progress import SILENT, Progress
-from ...core.scratch import scratch_folder, sweep
 from . import processes
 from .dependencies import OWNED_BY_QGIS, is_installed, pins
 from .interpreter import Interpreter
@@ -51,17 +51,7 @@ IMPORT = (
 
 @dataclass(frozen=True)
 class Order:
-    """What to install.
-
-    Attributes
-    ----------
-    requirements : tuple of str
-        In the syntax of pip.
-    modules : tuple of str
-        Modules that must be importable afterwards.
-    options : tuple of str
-        Options for pip, such as another package index.
-    """
+    """What to install: requirements for pip, modules that must be importable afterwards, and options for pip."""
 
     requirements: tuple[str, ...]
     modules: tuple[str, ...]
@@ -69,16 +59,7 @@ class Order:
 
 
 class Pip:
-    """The pip of QGIS's Python.
-
-    Parameters
-    ----------
-    interpreter : Interpreter
-    temporary : Path
-        Folder for temporary files.
-    folders : sequence of Path
-        Folders of packages in addition to those of QGIS.
-    """
+    """The pip of QGIS's Python, with a folder for temporary files, and further folders of packages than its own."""
 
     def __init__(self, interpreter: Interpreter, temporary: Path, folders: Sequence[Path]) -> None:
         self._program = interpreter.program
@@ -89,10 +70,7 @@ class Pip:
     def prepare(self, locked: Mapping[str, Locked], progress: Progress) -> None:
         """Check that pip is installed, and get a newer one if it is too old.
 
-        Raises
-        ------
-        RailExtractError
-            There is no pip, or no newer one can be installed.
+        Raises RailExtractError if there is no pip, or no newer one can be installed.
         """
         version = re.match(r"pip (\d+)\.(\d+)", self._run("--version").output)
         if version is None:
@@ -133,20 +111,7 @@ class Pip:
         self._install([package.requirement for package in packages], call, progress)
 
     def _install(self, names: Sequence[str], arguments: Sequence[str], progress: Progress) -> None:
-        """Run pip install.
-
-        Parameters
-        ----------
-        names : sequence of str
-            What is installed, for the message.
-        arguments : sequence of str
-        progress : Progress
-
-        Raises
-        ------
-        RailExtractError
-            It failed.
-        """
+        """Run pip install; raises RailExtractError with these names if it fails."""
         completed = self._run("install", BINARIES, *arguments, progress=progress)
         if completed.code == 0:
             return
@@ -162,13 +127,7 @@ class Pip:
         )
 
     def check_imports(self, modules: Sequence[str], folders: Sequence[Path]) -> None:
-        """Check that QGIS will be able to import modules.
-
-        Raises
-        ------
-        RailExtractError
-            A module cannot be imported.
-        """
+        """Check that QGIS will be able to import modules; raises RailExtractError if it won't."""
         paths = list(map(str, folders))
         arguments = ["-c", IMPORT, str(len(paths) + 2), *paths, *modules]
         completed = processes.run(self._program, arguments, self._changes)
@@ -184,27 +143,10 @@ class Pip:
 
 
 def install(order: Order, interpreter: Interpreter, folder: Path, others: Sequence[Path], progress: Progress) -> str:
-    """Install packages into `folder`, either all of them or none.
+    """Install packages into `folder`, either all of them or none, and return their names and versions.
 
-    Parameters
-    ----------
-    order : Order
-    interpreter : Interpreter
-    folder : Path
-        Created if it does not exist.
-    others : sequence of Path
-        Other folders of packages that QGIS uses.
-    progress : Progress
-
-    Returns
-    -------
-    str
-        Names and versions of the installed packages.
-
-    Raises
-    ------
-    RailExtractError
-        pip failed, the folder cannot be written, or the packages do not work with those of QGIS.
+    The folder is created if it does not exist; `others` are further ones that QGIS uses. Raises RailExtractError if pip
+    failed, the folder cannot be written, or the packages do not work with those of QGIS.
     """
     locked = locked_packages()
     with _temporary_folder(folder) as temporary:

@@ -24,13 +24,7 @@ print(*sys.version_info[:2], __version__)
 
 
 def find_interpreter() -> Interpreter:
-    """Find the Python program that has the same packages as QGIS.
-
-    Raises
-    ------
-    RailExtractError
-        No such program was found.
-    """
+    """Find the Python program that has the same packages as QGIS; raises RailExtractError without one."""
     expected = " ".join(map(str, (*sys.version_info[:2], version_of("numpy"))))
     # A relative path would be looked up in the current folder, or along PATH.
     found = filter(Path.is_absolute, candidates(Path(sys.executable), Path(sys.prefix), sys.platform))
@@ -54,16 +48,9 @@ def known_interpreter() -> Interpreter:
 
 
 def candidates(executable: Path, prefix: Path, platform: str) -> Iterator[Path]:
-    """List possible paths of the program, the likeliest first.
+    """List possible paths of the program, the likeliest first, from `sys.executable`, `sys.prefix` and `sys.platform`.
 
     On Windows and macOS, `executable` is QGIS itself, and starting it would open another QGIS.
-
-    Parameters
-    ----------
-    executable, prefix : Path
-        `sys.executable` and `sys.prefix`.
-    platform : str
-        `sys.platform`.
     """
     names = ["python3", "python", "python{}.{}".format(*sys.version_info)]
     if platform == "win32":

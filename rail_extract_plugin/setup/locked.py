@@ -48,15 +48,7 @@ def locked_packages() -> dict[str, Locked]:
 
 
 def locked_order(requirements: Sequence[str], locked: Mapping[str, Locked]) -> list[Locked] | None:
-    """Return all packages of an order, or None if the list does not have all of them.
-
-    Parameters
-    ----------
-    requirements : sequence of str
-        In the syntax of pip.
-    locked : mapping of str to Locked
-        The list, by name.
-    """
+    """Return all packages of an order, or None if the list does not have all of them."""
     names = dict.fromkeys(name for requirement in requirements for name in BROUGHT.get(requirement, (requirement,)))
     known = set(requirements) <= set(BROUGHT) and set(names) <= set(locked)
     return [locked[name] for name in names] if known else None

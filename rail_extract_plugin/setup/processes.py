@@ -9,8 +9,8 @@ from pathlib import Path
 
 from qgis.PyQt.QtCore import QProcess, QProcessEnvironment
 
+from ...core.disk import scratch_folder
 from ...core.progress import SILENT, Progress
-from ...core.scratch import scratch_folder
 
 POLL_MS = 200
 """Interval at which output is shown and cancellation is checked, milliseconds."""
@@ -18,15 +18,7 @@ POLL_MS = 200
 
 @dataclass(frozen=True)
 class Completed:
-    """The result of a program.
-
-    Attributes
-    ----------
-    code : int or None
-        Exit code; None if the program could not be started or crashed.
-    output : str
-        Its output, including errors.
-    """
+    """The output of a program, with errors, and its exit code: None if it could not be started or crashed."""
 
     code: int | None
     output: str
@@ -37,20 +29,8 @@ def run(
 ) -> Completed:
     """Run a program to its end, in a folder of its own: Python would import modules from the current folder.
 
-    Parameters
-    ----------
-    program : str
-        Absolute path.
-    arguments : sequence of str
-    changes : mapping, optional
-        Environment variables that differ from those of QGIS.
-    progress : Progress
-        Receives the lines of the output.
-
-    Raises
-    ------
-    Cancelled
-        The user cancelled; the program has been ended.
+    The path is absolute; `changes` are environment variables that differ from those of QGIS; the progress receives the
+    lines of the output. If the user cancels, the program is ended and Cancelled raised.
     """
     environment = QProcessEnvironment.systemEnvironment()
     for name, value in (changes or {}).items():

@@ -118,12 +118,8 @@ def _compare(
 ) -> tuple[float, float, float]:
     """Compare lines with the true ones, (n, 3) each, at places along the true lines between two eastings.
 
-    Returns
-    -------
-    completeness : float
-        Share of the places with a line within the tolerance.
-    lateral_m, height_m : float
-        Root mean square of the offsets there, in plan and in height; infinite if no line is near.
+    Returns the share of the places with a line within the tolerance, and the root mean squares of the offsets there, in
+    plan and in height; infinite if no line is near.
     """
     import numpy as np
 

@@ -19,12 +19,7 @@ def save_all(layers: Sequence[QgsVectorLayer], path: Path, report: Path | None =
     """Write layers, the topmost first, with styles and aliases of their fields, and a project that shows them.
 
     An existing file stays until the new one is complete. The report of the run is copied to a file beside; its path is
-    returned.
-
-    Raises
-    ------
-    RailExtractError
-        The file cannot be written, or a layer is being edited.
+    returned. Raises RailExtractError if the file cannot be written, or a layer is being edited.
     """
     edited = next((layer.name() for layer in layers if layer.isModified()), None)
     if edited:

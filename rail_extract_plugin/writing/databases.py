@@ -20,18 +20,8 @@ DEFAULT_SCHEMA = "public"
 def check_database(name: str, text: str) -> None:
     """Check before the run that a table can be written, if the output is one on a PostgreSQL server.
 
-    Parameters
-    ----------
-    name : str
-        Name of the output.
-    text : str
-        Its value.
-
-    Raises
-    ------
-    RailExtractError
-        The server does not answer or refuses the user, there is no such schema, the user may not create tables in it,
-        the database has no PostGIS, or the output does not name a table.
+    Raises RailExtractError if the server does not answer or refuses the user, there is no such schema, the user may not
+    create tables in it, the database has no PostGIS, or the output does not name a table.
     """
     found = POSTGRES.fullmatch(text)
     if found is None:

@@ -46,23 +46,9 @@ ESCAPE = "%[0-9A-Fa-f]{2}"
 
 
 def destinations(values: Mapping[str, Any], context: QgsProcessingContext) -> dict[str, Destination]:
-    """Check before the run that the outputs can be written, and remember what they replace.
+    """Check before the run that outputs can be written, remember what they replace, and return those that are files.
 
-    Parameters
-    ----------
-    values : mapping of str to str, QgsProperty, QgsProcessingOutputLayerDefinition or None
-        Value of each destination parameter.
-    context : QgsProcessingContext
-
-    Returns
-    -------
-    dict of str to Destination
-        The outputs that go into files.
-
-    Raises
-    ------
-    RailExtractError
-        A file cannot be written, or two outputs overwrite each other.
+    Raises RailExtractError if a file cannot be written, or two outputs overwrite each other.
     """
     files: dict[Path, Destination] = {}
     found: dict[str, Destination] = {}
@@ -92,10 +78,7 @@ def destinations(values: Mapping[str, Any], context: QgsProcessingContext) -> di
 def check_layer_name(name: str, value: Any, context: QgsProcessingContext) -> None:
     """Check before the run that QGIS can write a layer of this name.
 
-    Raises
-    ------
-    RailExtractError
-        QGIS reads what comes before a colon as the name of a data provider, and no provider has this name.
+    Raises RailExtractError where no provider has the name before a colon, which QGIS reads as one of a data provider.
     """
     text = destination_text(value, context)
     file, found = output_file(value, context), PROVIDER.fullmatch(text)
@@ -109,12 +92,7 @@ def check_layer_name(name: str, value: Any, context: QgsProcessingContext) -> No
 
 
 def check_page_name(name: str, value: Any, context: QgsProcessingContext) -> None:
-    """Check before the run that a report does not replace a file of another kind, such as the cloud that is read.
-
-    Raises
-    ------
-    RailExtractError
-    """
+    """Check before the run that a report does not replace a file of another kind, such as the cloud that is read."""
     path = output_file(value, context)
     if path is not None and path.suffix.lower() not in PAGES:
         raise RailExtractError(f"{name} can't be {path.name}: let it end in .html.")

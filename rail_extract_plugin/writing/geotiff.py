@@ -7,7 +7,7 @@ from pathlib import Path
 
 from osgeo import gdal
 
-from ...core.files.raster_file import BLOCK, NO_DATA, RasterHeader
+from ...core.files.rail_rasters import BLOCK, NO_DATA, RasterHeader
 from ...core.progress import SILENT, Progress
 from ...core.raster import RailRaster
 
@@ -23,22 +23,9 @@ CREATION = (
 
 
 def write_rasters(path: Path, header: RasterHeader, rasters: Sequence[RailRaster], progress: Progress = SILENT) -> None:
-    """Write rasters on the header's grid into a new file; cells outside its window are dropped.
+    """Write a raster for each class on the header's grid into a new file; cells outside its window are dropped.
 
-    Parameters
-    ----------
-    path : Path
-    header : RasterHeader
-    rasters : sequence of RailRaster
-        One for each class of the header.
-    progress : Progress
-
-    Raises
-    ------
-    OSError
-        The file cannot be written.
-    Cancelled
-        The user cancelled.
+    Raises OSError if the file cannot be written.
     """
     gdal.ErrorReset()
     try:

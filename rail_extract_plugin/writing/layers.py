@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     import numpy as np
 
     from ...core.files.layers import AnyLayer, Copy, Layer
-    from ...core.files.raster_file import RasterHeader
+    from ...core.files.rail_rasters import RasterHeader
     from ...core.frame import LocalFrame
     from ...core.raster import RailRaster
 
@@ -58,13 +58,7 @@ def fields(columns: Sequence[Field]) -> QgsFields:
 
 
 def features(layer: Layer, frame: LocalFrame) -> Iterator[QgsFeature]:
-    """Convert the features of a layer to those of QGIS, in the cloud's coordinates.
-
-    Parameters
-    ----------
-    layer : Layer
-    frame : LocalFrame
-    """
+    """Convert the features of a layer to those of QGIS, in the cloud's coordinates."""
     make = _line if layer.product.is_line else _point
     for places, xyz, *row in zip(layer.places(frame), layer.xyz, *layer.written_columns()):
         feature = QgsFeature()
@@ -112,10 +106,7 @@ def _copies(layer: Copy, columns: QgsFields) -> Iterator[QgsFeature]:
 def add_features(sink: QgsFeatureSink, made: Iterator[QgsFeature]) -> int:
     """Write features to a sink and return their number.
 
-    Raises
-    ------
-    RailExtractError
-        A feature cannot be written, for example because the disk is full.
+    Raises RailExtractError if one cannot be written, for example because the disk is full.
     """
     count = 0
     for feature in made:
@@ -127,26 +118,9 @@ def add_features(sink: QgsFeatureSink, made: Iterator[QgsFeature]) -> int:
 
 
 def write_layer(values: ParameterValues, name: str, layer: AnyLayer, frame: LocalFrame) -> dict[str, str]:
-    """Write a layer to an output.
+    """Write a layer to the output of this name; returns its id by that name, and nothing if the user skipped it.
 
-    Parameters
-    ----------
-    values : ParameterValues
-    name : str
-        Name of the output.
-    layer : Layer or Copy
-    frame : LocalFrame
-        Local frame of the layer.
-
-    Returns
-    -------
-    dict of str to str
-        The layer's id by the name of the output; empty if the user skipped it.
-
-    Raises
-    ------
-    RailExtractError
-        The output cannot be written.
+    Raises RailExtractError if the output cannot be written.
     """
     from ...core.files.layers import Copy
 
@@ -167,14 +141,7 @@ def write_layer(values: ParameterValues, name: str, layer: AnyLayer, frame: Loca
 def layer_writers(
     values: ParameterValues, makers: Mapping[str, Callable[[], AnyLayer]], frame: LocalFrame
 ) -> dict[str, Callable[[], dict[str, str]]]:
-    """Return the functions that make layers and write them to the outputs of their names, for `write_each`.
-
-    Parameters
-    ----------
-    makers : mapping of str to callable
-    values, frame
-        See `write_layer`.
-    """
+    """Return the functions that make layers and write them to the outputs of their names, for `write_each`."""
 
     def write(name: str) -> dict[str, str]:
         return write_layer(values, name, makers[name](), frame)
@@ -185,21 +152,7 @@ def layer_writers(
 def write_raster(
     values: ParameterValues, name: str, header: RasterHeader, rasters: Sequence[RailRaster], progress: Progress
 ) -> dict[str, str]:
-    """Write rail rasters, one per class, to an output.
-
-    Parameters
-    ----------
-    values, name
-        See `write_layer`.
-    header : RasterHeader
-    rasters : sequence of RailRaster
-    progress : Progress
-
-    Returns
-    -------
-    dict of str to str
-        The path of the file by the name of the output; empty if the user skipped it.
-    """
+    """Write rail rasters, one per class, to an output; returns the path by its name, and nothing if it is skipped."""
     from .geotiff import write_rasters
 
     if not values.wanted(name):

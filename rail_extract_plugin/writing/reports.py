@@ -17,23 +17,8 @@ REPORT = "REPORT"
 def write_shown(values: ParameterValues, build: Callable[[], str], name: str = REPORT) -> dict[str, str]:
     """Write a page if the user wants it, and have QGIS show a report; an existing file stays until it is complete.
 
-    Parameters
-    ----------
-    values : ParameterValues
-    build : callable
-        Returns the page.
-    name : str
-        Of the output.
-
-    Returns
-    -------
-    dict of str to str
-        The path of the file by the name of the output; empty if the user skipped it.
-
-    Raises
-    ------
-    RailExtractError
-        The file cannot be written.
+    Returns the path of the file by the name of the output, and nothing if it is skipped. Raises RailExtractError if the
+    file cannot be written.
     """
     path = values.output_file(name)
     if not path:
@@ -45,16 +30,7 @@ def write_shown(values: ParameterValues, build: Callable[[], str], name: str = R
 
 
 def write_check(values: ParameterValues, verdict: str, facts: Mapping[str, str]) -> dict[str, str]:
-    """Write the result of Check Installation, which no run shows by itself.
-
-    Parameters
-    ----------
-    values : ParameterValues
-    verdict : str
-        A sentence.
-    facts : mapping of str to str
-        Findings by name.
-    """
+    """Write the result of Check Installation, a sentence and findings by name, which no run shows by itself."""
     path = values.output_file("REPORT")
     if not path:
         return {}

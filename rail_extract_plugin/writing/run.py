@@ -36,18 +36,7 @@ TABLE = "|layername="
 
 @dataclass(frozen=True)
 class RunCloud:
-    """The cloud of a run.
-
-    Attributes
-    ----------
-    paths : tuple of str
-    class_codes : tuple of int
-    crs_wkt : str or None
-        Coordinate system for files that state none.
-    head_width_m : float
-    units_m : tuple of float
-        Lengths of the units of x, y and z.
-    """
+    """The cloud of a run, with a coordinate system for files that state none, and the units of x, y and z in metres."""
 
     paths: tuple[str, ...]
     class_codes: tuple[int, ...]
@@ -63,15 +52,9 @@ class RunCloud:
 
 
 def new_run(tool: str, value: Any, context: QgsProcessingContext) -> dict[str, str]:
-    """Return the properties that the layers of a new run share.
+    """Return the properties that the layers of a new run of a tool, by its label, share.
 
-    Parameters
-    ----------
-    tool : str
-        Label of the algorithm.
-    value : object
-        Value of its main input, which gives the layers their names: that of the layer, or of the file.
-    context : QgsProcessingContext
+    The main input gives the layers their names: that of a layer, or of a file.
     """
     value = value.source if isinstance(value, QgsProcessingFeatureSourceDefinition) else value
     value = value.valueAsString(context.expressionContext())[0] if isinstance(value, QgsProperty) else value

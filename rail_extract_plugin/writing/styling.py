@@ -132,22 +132,11 @@ def style_on_load(
     title: str = "",
     has_system: bool = True,
 ) -> None:
-    """Apply a style if QGIS loads the layer after the run.
+    """Apply a style, by the name of its .qml file, if QGIS loads the layer after the run.
 
-    The layers of a run are in one group, in the order of `TOP_TO_BOTTOM`.
-
-    Parameters
-    ----------
-    layer_id : str
-    style : str
-        Name of a .qml file of the plugin, without its suffix.
-    context : QgsProcessingContext
-    properties : mapping of str to str
-        To be stored with the layer.
-    title : str
-        Name of the output. A layer with this name gets that of the input as well; a model, for example, gives its own.
-    has_system : bool
-        Whether the coordinate system of the layer is known.
+    The layers of a run are in one group, in the order of `TOP_TO_BOTTOM`. The properties are stored with the layer. A
+    layer whose name is the title of the output gets that of the input as well; a model, for example, gives its own.
+    `has_system` says whether the coordinate system of the layer is known.
     """
     if context.willLoadLayerOnCompletion(layer_id):
         details = context.layerToLoadOnCompletionDetails(layer_id)

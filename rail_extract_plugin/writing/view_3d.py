@@ -19,11 +19,7 @@ WIDTHS_PX = {"rails": 3.0, "centerlines": 2.0, "findings": 6.0}
 def show_lines_in_3d(layer: QgsVectorLayer, style: str) -> None:
     """Draw a layer of lines in 3D map views at the heights of its vertices; without them, QGIS lays it on the terrain.
 
-    Parameters
-    ----------
-    layer : QgsVectorLayer
-    style : str
-        Name of the layer's style; other layers than those in `COLORS` stay as they are.
+    Layers of other styles than those in `COLORS` stay as they are.
     """
     if style not in COLORS:
         return

@@ -14,10 +14,9 @@ from qgis.core import (
     QgsProperty,
 )
 
-from ...core.disk import Destination
+from ...core.disk import Destination, scratch_folder
 from ...core.errors import RailExtractError
-from ...core.files.geopackage import tables_in
-from ...core.scratch import scratch_folder
+from ...core.files.writing import tables_in
 from ..dialog.parameter_values import ParameterValues
 from .destinations import appends, output_file, table_of
 
@@ -34,29 +33,10 @@ def write_whole(
     """Write a layer in a temporary folder next to its destination, and move its files there when complete.
 
     The other tables of a GeoPackage stay, and so do the features of a layer to which new ones are added. Memory layers,
-    and tables in databases on servers, are written directly.
-
-    Parameters
-    ----------
-    value : str, QgsProperty, QgsProcessingOutputLayerDefinition or None
-        Value of the destination parameter.
-    context : QgsProcessingContext
-    destination : Destination or None
-        The file that the value names.
-    write : callable
-        Writes to such a value, and returns the layer's id and number of features; an empty id if skipped.
-    system_wkt : str, optional
-        Coordinate system that the file is to state, where QGIS can write only part of it.
-
-    Returns
-    -------
-    str
-        The layer's id; empty if the user skipped the output.
-
-    Raises
-    ------
-    RailExtractError
-        The files cannot be written completely.
+    and tables in databases on servers, are written directly. `write` writes to such a value, and returns the layer's id
+    and number of features; `system_wkt` is the coordinate system that the file is to state, where QGIS can write only
+    part of it. Returns the layer's id, empty if the user skipped the output. Raises RailExtractError if the files
+    cannot be written completely.
     """
     if destination is None:
         return write(value)[0]
@@ -89,16 +69,8 @@ def _write_table(value: Any, destination: Destination, table: str, write: Write,
 def write_each(writers: Mapping[str, Callable[[], dict[str, str]]], values: ParameterValues) -> dict[str, str]:
     """Write the outputs of a run one after the other; if one fails, the others are still written.
 
-    Parameters
-    ----------
-    writers : mapping of str to callable
-        Function that writes an output, by its name; returns the path or id by that name, or nothing if skipped.
-    values : ParameterValues
-
-    Raises
-    ------
-    RailExtractError
-        An output could not be written; the message states which, why, and which files are complete.
+    A writer returns the path or id by the name of its output, or nothing if skipped. Raises RailExtractError with what
+    could not be written, why, and which files are complete.
     """
     written: dict[str, str] = {}
     failures: dict[str, Exception] = {}
@@ -158,10 +130,7 @@ def _count(file: Path) -> int:
 def _copy_table(source: Path, target: Path, table: str, system_wkt: str | None = None) -> None:
     """Copy a table of a file into another file, in place of the table of this name; it may state another system.
 
-    Raises
-    ------
-    OSError
-        The other file cannot be written.
+    Raises OSError if the other file cannot be written.
     """
     gdal.ErrorReset()
     mode = "overwrite" if target.exists() else None

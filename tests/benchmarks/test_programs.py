@@ -6,10 +6,10 @@ import subprocess
 import sys
 from pathlib import Path
 
-import laspy
 import numpy as np
 import pytest
 from rail_extract.core.squares import steps
+from rail_extract.laboratory.scenes.las import write_las
 from rail_extract.laboratory.scenes.scene import RAIL
 from rail_extract.laboratory.scenes.whole_rails import WHOLE
 
@@ -30,12 +30,9 @@ def test_open_data_is_evaluated_with_whole_rails_in_the_class(words, tmp_path, m
     pytest.importorskip("torch")
     monkeypatch.syspath_prepend(str(PROGRAMS[0].parent))
     scene = WHOLE["whole"]()
-    header = laspy.LasHeader(version="1.2", point_format=3)
-    header.scales, header.offsets = np.full(3, 0.001), np.floor(scene.xyz.min(axis=0))
-    cloud = laspy.LasData(header)
-    cloud.x, cloud.y, cloud.z = scene.xyz.T
-    cloud.classification = np.where(scene.classification == RAIL, 5, scene.classification)
-    cloud.write(tmp_path / "ACQ_286_Don_Lens_F_0+950_1+000.laz")
+    codes = np.where(scene.classification == RAIL, 5, scene.classification)
+    name = "ACQ_286_Don_Lens_F_0+950_1+000.laz"
+    write_las(tmp_path / name, scene.xyz, offsets=np.floor(scene.xyz.min(axis=0)), point_format=3, classification=codes)
     runpy.run_path(str(PROGRAMS[0].parent / "open_data.py"))["main"]([str(tmp_path), *words])
     row = capsys.readouterr().out.splitlines()[2].split()
     found, right, across_mm, height_mm = (float(value) for value in row[5:9])

@@ -1,16 +1,117 @@
-"""Replacement of files: old or new, never part of each, whoever else is at work in the folder."""
+"""Files of a run are complete or absent, and temporary folders are private and removed when their process is gone."""
 
 import os
+import shutil
 import signal
 import stat
 import subprocess
 import sys
 import threading
+from pathlib import Path
 
 import pytest
-from rail_extract.core.disk import Destination
+from rail_extract.core.disk import MARK, MIN_AGE_S, MIN_UNMARKED_AGE_S, PREFIX, Destination, scratch_folder, sweep
 from rail_extract.core.errors import DiskError
-from rail_extract.core.scratch import MIN_AGE_S, PREFIX
+
+KILLED = """
+import os, signal, sys
+from pathlib import Path
+from rail_extract.core.disk import scratch_folder
+
+with scratch_folder(Path(sys.argv[1])) as folder:
+    (folder / "points").write_text("x")
+    print(folder, flush=True)
+    if len(sys.argv) == 2:
+        os.kill(os.getpid(), signal.SIGKILL)
+    sys.stdin.read()
+"""
+
+
+@pytest.fixture
+def killed(tmp_path):
+    """The temporary folder of a killed process."""
+    said = subprocess.run([sys.executable, "-c", KILLED, str(tmp_path)], capture_output=True, text=True)
+    assert said.returncode == -signal.SIGKILL
+    (folder,) = tmp_path.iterdir()
+    assert (folder / "points").exists()
+    return folder
+
+
+def age(folder):
+    os.utime(folder / MARK, (0, (folder / MARK).stat().st_mtime - MIN_AGE_S - 1))
+
+
+def test_a_folder_goes_when_the_block_ends_with_or_without_an_error(tmp_path):
+    with scratch_folder(tmp_path) as folder:
+        (folder / "points").write_text("x")
+    with pytest.raises(KeyError), scratch_folder(tmp_path):
+        raise KeyError
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_folder_of_a_killed_process_is_removed_once_it_is_old(tmp_path, killed):
+    sweep(tmp_path)
+    assert killed.exists()
+    age(killed)
+    sweep(tmp_path)
+    assert not killed.exists()
+
+
+def test_the_folder_of_a_running_process_stays_however_old_it_is(tmp_path):
+    call = [sys.executable, "-c", KILLED, str(tmp_path), "wait"]
+    with subprocess.Popen(call, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
+        process.stdout.readline()
+        (folder,) = tmp_path.iterdir()
+        age(folder)
+        sweep(tmp_path)
+        assert (folder / "points").exists()
+        process.stdin.close()
+    assert not folder.exists()
+
+
+def test_own_folders_stay_too(tmp_path):
+    with scratch_folder(tmp_path) as folder:
+        age(folder)
+        sweep(tmp_path)
+        assert folder.exists()
+
+
+def test_folders_of_other_computers_and_users_and_other_names_stay(tmp_path, killed, monkeypatch):
+    age(killed)
+    other = killed.with_name(".rail_extract_mine")
+    shutil.copytree(killed, other)
+    link = killed.with_name(killed.name[:-1] + ("0" if killed.name[-1] != "0" else "1"))
+    link.symlink_to(other)
+    monkeypatch.setattr("platform.node", lambda: "elsewhere")
+    sweep(tmp_path)
+    assert killed.exists()
+    monkeypatch.undo()
+    if hasattr(os, "getuid"):
+        monkeypatch.setattr(os, "getuid", lambda: -1)
+        sweep(tmp_path)
+        assert killed.exists()
+        monkeypatch.undo()
+    sweep(tmp_path)
+    assert sorted(tmp_path.iterdir()) == sorted([other, link])
+    assert (other / "points").exists()
+
+
+@pytest.mark.parametrize("unmark", [Path.unlink, lambda mark: mark.write_text("")])
+def test_a_folder_without_a_mark_stays_for_a_day(tmp_path, killed, unmark):
+    unmark(killed / MARK)
+    sweep(tmp_path)
+    assert killed.exists()
+    os.utime(killed, (0, killed.stat().st_mtime - MIN_UNMARKED_AGE_S - 1))
+    sweep(tmp_path)
+    assert not killed.exists()
+
+
+def test_a_folder_is_rescued_before_it_is_removed(tmp_path, killed):
+    age(killed)
+    seen = []
+    sweep(tmp_path, lambda folder: seen.append((folder / "points").read_text()))
+    assert seen == ["x"]
+    assert not killed.exists()
 
 
 def fill(folder, **files):
@@ -34,7 +135,7 @@ def temporary(folder):
     return [entry.name for entry in folder.iterdir() if entry.name.startswith(PREFIX)]
 
 
-def age(folder):
+def age_of_disk(folder):
     """Make temporary folders old enough to be removed."""
     for name in temporary(folder):
         mark = folder / name / "in_use"
@@ -187,7 +288,7 @@ def test_access_rights_of_the_old_file_are_kept(tmp_path, mode):
     assert {stat.S_IMODE(file.stat().st_mode) for file in tmp_path.iterdir()} == {mode}
 
 
-KILLED = """
+KILLED_DISK = """
 import os, signal, sys
 from pathlib import Path
 from rail_extract.core.disk import Destination
@@ -214,7 +315,7 @@ KILLED_FOLDER = """
 import os, signal, sys
 from pathlib import Path
 from rail_extract.core.disk import NEW, replace_folder
-from rail_extract.core.scratch import scratch_folder
+from rail_extract.core.disk import scratch_folder
 
 target, left, replace = Path(sys.argv[1]), int(sys.argv[2]), Path.replace
 
@@ -243,7 +344,7 @@ def test_killed_at_any_move_a_folder_is_old_or_new_after_the_next_run(tmp_path, 
         target.mkdir()
         (target / "tile").write_text("old")
     subprocess.run([sys.executable, "-c", KILLED_FOLDER, str(target), str(moves)])
-    age(tmp_path)
+    age_of_disk(tmp_path)
     Destination.at(tmp_path / "other.txt")
     assert (target / "tile").read_text() == text
     assert temporary(tmp_path) == []
@@ -258,20 +359,20 @@ def test_killed_at_any_move_a_folder_is_old_or_new_after_the_next_run(tmp_path, 
     ],
 )
 def test_killed_at_any_move_a_set_is_old_or_new_or_cannot_be_opened_until_the_next_run(tmp_path, name, before, after):
-    """The set that opens has files of one age, and the next run into the folder leaves a complete set."""
+    """The set that opens has files of one age_of_disk, and the next run into the folder leaves a complete set."""
     survived = False
     for moves in range(12):
         folder = tmp_path / f"{moves}"
         folder.mkdir()
         for suffix in before:
             (folder / f"a{suffix}").write_text("old")
-        call = [sys.executable, "-c", KILLED, str(folder / name), str(moves), *after]
+        call = [sys.executable, "-c", KILLED_DISK, str(folder / name), str(moves), *after]
         survived = subprocess.run(call).returncode != -signal.SIGKILL
         if (folder / name).exists():
             assert len(set(contents(folder).values())) == 1
         elif before:
             assert len(after) > 1  # a single file is never absent
-        age(folder)
+        age_of_disk(folder)
         write(Destination.at(folder / "other.txt"))
         (folder / "other.txt").unlink()
         sets = [{f"a{suffix}": text for suffix in suffixes} for suffixes, text in ((before, "old"), (after, "new"))]
@@ -283,11 +384,11 @@ def test_killed_at_any_move_a_set_is_old_or_new_or_cannot_be_opened_until_the_ne
 
 
 def test_an_interrupted_move_does_not_overwrite_what_the_user_has_written_since(tmp_path):
-    call = [sys.executable, "-c", KILLED, str(tmp_path / "a.shp"), "1", ".shp", ".dbf"]
+    call = [sys.executable, "-c", KILLED_DISK, str(tmp_path / "a.shp"), "1", ".shp", ".dbf"]
     assert subprocess.run(call).returncode == -signal.SIGKILL
     (tmp_path / "a.shp").write_text("mine")
     (tmp_path / "a.dbf").write_text("mine")
-    age(tmp_path)
+    age_of_disk(tmp_path)
     Destination.at(tmp_path / "other.txt")
     assert contents(tmp_path) == {"a.shp": "mine", "a.dbf": "mine"}
     assert temporary(tmp_path) == []

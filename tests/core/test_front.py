@@ -13,6 +13,7 @@ from rail_extract.core.fields import CENTERLINE_FIELDS, QUALITY_FIELDS, RAIL_FIE
 from rail_extract.core.parameters import Parameters
 from rail_extract.core.pipeline import extract_rails
 from rail_extract.core.standards import STANDARDS
+from rail_extract.laboratory.scenes.las import write_las
 
 SAMPLE = Path(rx.__file__).parent / "resources" / "sample" / "sample.laz"
 STANDARD = STANDARDS["IN_75R_1000"]
@@ -104,11 +105,7 @@ def test_raw_points_are_classified_into_a_copy_from_which_rails_come(tmp_path):
     from rail_extract.laboratory.scenes.raw_catalogue import RAW_SCENES
 
     scene = RAW_SCENES["narrow"](7)
-    header = laspy.LasHeader(point_format=6, version="1.4")
-    header.scales = [0.001] * 3
-    cloud = laspy.LasData(header)
-    cloud.x, cloud.y, cloud.z = scene.xyz.T
-    cloud.write(tmp_path / "raw.laz")
+    write_las(tmp_path / "raw.laz", scene.xyz, offsets=np.zeros(3))
     figures = rx.classify(tmp_path / "raw.laz", tmp_path / "new.laz", standard="EN_49E1_1000", workers=1).figures
     assert figures["PAIRED_LENGTH"] == pytest.approx(100, abs=6)
     labelled = laspy.read(tmp_path / "new.laz").classification

@@ -3,21 +3,9 @@
 import re
 
 import pytest
+from heard import Heard
 from rail_extract.core.errors import Cancelled
-from rail_extract.core.progress import Estimating, Progress
-
-
-class Listener(Progress):
-    def __init__(self):
-        self.texts, self.fractions = [], []
-
-    def set_fraction(self, fraction):
-        self.fractions.append(fraction)
-
-    def status(self, text):
-        self.texts.append(text)
-
-    info = warning = status
+from rail_extract.core.progress import Estimating
 
 
 class Clock:
@@ -29,12 +17,12 @@ class Clock:
 
 def run(steps):
     """Report (second, fraction) pairs and return the status messages."""
-    listener, clock = Listener(), Clock()
-    progress = Estimating(listener, clock)
+    heard, clock = Heard(), Clock()
+    progress = Estimating(heard, clock)
     for clock.now, fraction in steps:
         progress.set_fraction(fraction)
-    assert listener.fractions == [fraction for _, fraction in steps]
-    return listener.texts
+    assert heard.fractions == [fraction for _, fraction in steps]
+    return heard.texts()
 
 
 def test_the_estimate_is_exact_at_constant_speed():
@@ -68,46 +56,46 @@ def test_nothing_is_said_until_the_time_is_known_to_a_factor_of_two():
 
 
 def test_the_time_before_an_activity_does_not_count_in_its_speed():
-    listener, clock = Listener(), Clock()
-    progress = Estimating(listener, clock)
+    heard, clock = Heard(), Clock()
+    progress = Estimating(heard, clock)
     progress.set_fraction(0.2)
     clock.now = 60.0  # an import
     progress.status("The network has started")
     for second in range(61, 71):
         clock.now = second
         progress.set_fraction(0.2 + (second - 60) / 100)
-    assert listener.texts == ["The network has started", "30 % done, about 70 seconds left"]
+    assert heard.texts() == ["The network has started", "30 % done, about 70 seconds left"]
 
 
 def test_nothing_is_estimated_while_files_are_read():
-    listener, clock = Listener(), Clock()
-    progress = Estimating(listener, clock)
+    heard, clock = Heard(), Clock()
+    progress = Estimating(heard, clock)
     progress.span(0.0, 0.1).reading()
     for clock.now in range(1, 30):
         progress.set_fraction(0.1 * clock.now / 29)
     progress.status("Searching for rails")
-    assert listener.texts == ["Searching for rails"]
+    assert heard.texts() == ["Searching for rails"]
     for clock.now in range(30, 41):
         progress.set_fraction(0.1 + (clock.now - 29) / 90)
-    assert listener.texts[1:] == ["16 % done, about 80 seconds left", "21 % done, about 70 seconds left"]
+    assert heard.texts()[1:] == ["16 % done, about 80 seconds left", "21 % done, about 70 seconds left"]
 
 
 def test_spans_relay_everything():
-    listener = Listener()
-    span = Estimating(listener).span(0.2, 0.6)
+    heard = Heard()
+    span = Estimating(heard).span(0.2, 0.6)
     span.status("reading")
     span.info("one file")
     span.warning("no coordinate system")
     span.set_fraction(0.5)
-    assert listener.texts == ["reading", "one file", "no coordinate system"]
-    assert listener.fractions == [pytest.approx(0.4)]
+    assert heard.texts() == ["reading", "one file", "no coordinate system"]
+    assert heard.fractions == [pytest.approx(0.4)]
     assert not span.is_cancelled()
-    listener.is_cancelled = lambda: True
+    heard.is_cancelled = lambda: True
     with pytest.raises(Cancelled):
         span.check()
 
 
 def test_a_step_of_a_step_covers_its_part_of_the_whole():
-    listener = Listener()
-    listener.span(0.2, 0.6).span(0.5, 1.0).span(0.0, 0.5).set_fraction(1.0)
-    assert listener.fractions == [pytest.approx(0.5)]
+    heard = Heard()
+    heard.span(0.2, 0.6).span(0.5, 1.0).span(0.0, 0.5).set_fraction(1.0)
+    assert heard.fractions == [pytest.approx(0.5)]

@@ -11,9 +11,9 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-import laspy
 import numpy as np
 import pytest
+from rail_extract.laboratory.scenes.las import write_las
 from rail_extract.laboratory.scenes.raw import scan_world
 from rail_extract.laboratory.scenes.raw_catalogue import BLUNT, STANDARD, line, parallel
 from rail_extract.laboratory.scenes.raw_strips import strip
@@ -80,13 +80,7 @@ def _written(path: Path, length_m: float, rail_class: int) -> Path:
     """Write a strip of track, with a class for the points on heads."""
     track = strip(length_m)
     xyz = track.xyz + [500_000.0, 3_000_000.0, 100.0]
-    header = laspy.LasHeader(point_format=6, version="1.4")
-    header.scales, header.offsets = [0.001] * 3, xyz[0]
-    cloud = laspy.LasData(header)
-    cloud.xyz = xyz
-    cloud.classification = np.where(track.head, rail_class, 1).astype(np.uint8)
-    cloud.write(path)
-    return path
+    return write_las(path, xyz, classification=np.where(track.head, rail_class, 1))
 
 
 @pytest.fixture(scope="session")

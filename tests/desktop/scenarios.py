@@ -44,7 +44,6 @@ from qgis.PyQt.QtWidgets import (
     QLineEdit,
     QMenu,
     QPushButton,
-    QTableView,
     QTextBrowser,
     QTextEdit,
     QWidget,
@@ -54,13 +53,6 @@ from qgis.utils import iface, loadPlugin, plugins, reloadPlugin, startPlugin, un
 RAW, BLUNT, LABELLED, SAMPLE, ARCHIVE = (
     os.environ[f"RAIL_EXTRACT_{name}"] for name in ("RAW", "BLUNT", "LABELLED", "SAMPLE", "ZIP")
 )
-NAMES = (
-    *("extractrails", "classifyrailpoints", "growrailpoints", "airbornecenterlines"),
-    *("rasterizerailpoints", "frpdfcleanup", "vectorizerails"),
-    *("buildtrackcenterlines", "measuretrackgeometry", "stationalongaxis", "fitalignment", "comparetracks"),
-    *("exportalignment", "importalignment", "trainrailclassifier", "installpackages", "checkinstallation"),
-)
-
 PART = {
     "STANDARD": "IN_75R_1000",
     "EXTENT": "578215,578235,2494290,2494390 [EPSG:32643]",
@@ -99,17 +91,20 @@ class Browser(QObject):
 
 
 def dialogs(driver: Driver) -> Iterator:
-    """Install the plugin, open every dialog, press its buttons, and run Check installation."""
+    """Open every dialog, turn the wheel over its fields, press its buttons, choose clouds, and run two of them."""
     yield from install(ARCHIVE)
-    browser = Browser()
-    able = [name for name in NAMES if algorithm(name).canExecute()[0]]
-    driver.keep("without their packages", [name for name in NAMES if name not in able])
+    browser, changed = Browser(), {}
+    names = [one.name() for one in QgsApplication.processingRegistry().providerById("railextract").algorithms()]
+    able = [name for name in names if algorithm(name).canExecute()[0]]
+    driver.keep("without their packages", sorted(set(names) - set(able)))
     for name in able:
         dialog = yield from open_dialog(name)
         for group in dialog.findChildren(QGroupBox):
             group.setProperty("collapsed", False)
         yield 0.3
         driver.picture(f"dialog_{name}")
+        dialog.buttonBox().setFocus()
+        changed[name] = [label for one in _fields(dialog.mainWidget()) for label in _turn_over(one)]
         driver.keep("ids", {**driver.results.get("ids", {}), name: _ids_shown(dialog)})
         dialog.buttonBox().button(QDialogButtonBox.StandardButton.Help).click()
         yield from close(dialog)
@@ -123,6 +118,8 @@ def dialogs(driver: Driver) -> Iterator:
     driver.keep("check", (yield from press_run(dialog)))
     driver.picture("check")
     yield from close(dialog)
+    yield from _wheel_elsewhere(driver, changed)
+    yield from _run_or_not(driver)
 
 
 def _ids_shown(dialog: QWidget) -> list[str]:
@@ -174,18 +171,8 @@ def _answer(chooser: QFileDialog, path: str) -> Iterator:
     yield 0.5
 
 
-def wheel(driver: Driver) -> Iterator:
-    """Turn the wheel over every list and number of all dialogs, of the toolbar and of the dock, and close dialogs."""
-    yield from install(ARCHIVE)
-    changed: dict[str, list] = {}
-    for name in [name for name in NAMES if algorithm(name).canExecute()[0]]:
-        dialog = yield from open_dialog(name)
-        for group in dialog.findChildren(QGroupBox):
-            group.setProperty("collapsed", False)
-        yield 0.3
-        dialog.buttonBox().setFocus()
-        changed[name] = [label for one in _fields(dialog.mainWidget()) for label in _turn_over(one)]
-        yield from close(dialog)
+def _wheel_elsewhere(driver: Driver, changed: dict[str, list]) -> Iterator:
+    """Turn the wheel over the lists of the toolbar and of the dock, and over one that has the focus."""
     windows = plugins["rail_extract"].windows
     windows.dock.layers.addItems(["one", "two"])
     changed["toolbar"], changed["dock"] = _turn_over(windows.growing.standards), _turn_over(windows.dock.layers)
@@ -198,7 +185,6 @@ def wheel(driver: Driver) -> Iterator:
     driver.keep("changed with the focus", len(_turn_over(standard.widget)))
     driver.picture("wheel")
     yield from close(dialog)
-    yield from _run_or_not(driver)
 
 
 def _run_or_not(driver: Driver) -> Iterator:
@@ -433,7 +419,6 @@ def again(driver: Driver) -> Iterator:
     driver.keep("dock is visible", dock.isVisible())
     driver.keep("first finding", dock.reason.text())
     driver.picture("right_review")
-    yield from _save_all(driver, log)
     yield from close(dialog)
 
 
@@ -636,18 +621,6 @@ def review(driver: Driver) -> Iterator:
     driver.keep("dock is visible", dock.isVisible())
     yield lambda: not dock.is_reading
     driver.keep("count", dock.count.text())
-    texts = []
-    for number in range(int(dock.count.text().split()[2].rstrip(";"))):
-        dock.go(number)
-        texts.append((dock.reason.text(), dock.text.text()))
-        if "no points" in dock.reason.text() and "rail without" in dock.text.text():
-            yield 0.5
-            driver.picture(f"review_missing_{number}")
-    driver.keep("texts", texts)
-    _place_dock(driver, dock)
-    yield 1.0
-    driver.picture("review_wide")
-    iface.mainWindow().resizeDocks([dock], [320], Qt.Orientation.Horizontal)
     dock.go(0)
     dock.buttons["next"].click()
     yield 1.0
@@ -661,69 +634,8 @@ def review(driver: Driver) -> Iterator:
     driver.keep("scale", iface.mapCanvas().extent().width())
     yield 1.0
     driver.picture("review_rejected")
-    yield from _review_by_keys(driver, dock)
-    layer = _findings()
     driver.keep("order", [node.name() for node in QgsProject.instance().layerTreeRoot().findLayers()])
-    yield from _open_table(driver, layer)
     yield from _show_in_3d(driver, menu)
-
-
-def _findings() -> QgsVectorLayer:
-    """Return the layer of findings, whatever QGIS calls it."""
-    layers = QgsProject.instance().mapLayers().values()
-    return next(one for one in layers if one.customProperty("rail_extract/style") == "findings")
-
-
-def _place_dock(driver: Driver, dock: QDockWidget) -> None:
-    """Look where the dock is, and make it wide."""
-    window = iface.mainWindow()
-    toolbox = window.findChild(QDockWidget, "ProcessingToolbox")
-    toolbox.setUserVisible(True)
-    QApplication.processEvents()
-    driver.keep("tabs beside the dock", [one.objectName() for one in window.tabifiedDockWidgets(dock)])
-    driver.keep("toolbox as high as the dock", toolbox.height() == dock.height())
-    driver.picture("review_toolbox")
-    dock.raise_()
-    window.resizeDocks([dock], [700], Qt.Orientation.Horizontal)
-
-
-def _review_by_keys(driver: Driver, dock: QDockWidget) -> Iterator:
-    """Go and decide by keys, and undo a decision within an edit session of the layer."""
-    press = partial(QTest.keyClick, dock.widget())
-    at = [dock.count.text()]
-    QApplication.setActiveWindow(iface.mainWindow())  # which no window manager does here
-    dock.widget().setFocus()
-    for key in (Qt.Key.Key_N, Qt.Key.Key_P, Qt.Key.Key_P):
-        press(key)
-        at.append(dock.count.text())
-    driver.keep("by keys", [int(text.split()[0]) for text in at])
-    layer = _findings()
-    layer.startEditing()
-    dock.go(2)
-    before = dock.count.text()
-    press(Qt.Key.Key_A)
-    press(Qt.Key.Key_R)
-    yield 0.2
-    decided = dock.count.text()
-    for _ in range(2):
-        layer.undoStack().undo()
-    yield 0.2
-    dock.go(2)
-    driver.keep("edited", [before, decided, dock.count.text(), dock.buttons["accepted"].isChecked()])
-    layer.rollBack()
-
-
-def _open_table(driver: Driver, layer: QgsVectorLayer) -> Iterator:
-    """Open the table of a layer, and look at its columns."""
-    table = iface.showAttributeTable(layer)
-    table.resize(1400, 400)
-    yield 1.0
-    driver.picture("review_table")
-    view = table.findChild(QTableView)
-    header, columns = view.model().headerData, range(view.model().columnCount())
-    titles = [header(column, Qt.Orientation.Horizontal) for column in columns]
-    driver.keep("column widths", {str(title): view.columnWidth(column) for column, title in zip(columns, titles)})
-    table.close()
 
 
 def _show_in_3d(driver: Driver, menu: QMenu) -> Iterator:
@@ -759,12 +671,7 @@ def growing(driver: Driver) -> Iterator:
     yield from _answer(chooser, RAW)
     yield lambda: tool.message and not tool.is_growing
     driver.keep("said beside", tool.message)
-    driver.keep("cloud in the toolbar", tool.clouds.combo.currentText())
     driver.picture("grow_missed")
-    tool.clouds.set_value(SAMPLE)
-    driver.keep("said of the sample", tool.message)
-    yield 0.5
-    driver.picture("grow_sample")
     layer = QgsPointCloudLayer(RAW, "raw", "pdal")  # invalid in a QGIS without PDAL
     layer.setCrs(system)
     iface.setActiveLayer(QgsProject.instance().addMapLayer(layer))

@@ -12,12 +12,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import laspy
 import numpy as np
 import pytest
 from faults import FINE, REFUSED, WARNED, Fault
 from fuzzing.clouds import chunks_of_any_size
-from rail_extract.core.clouds.crs import import_pyproj
+from rail_extract.laboratory.scenes.las import write_las
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 
@@ -165,18 +164,10 @@ def write_cloud(tmp_path):
         any_chunk_size: bool = False,
         strips: np.ndarray | int = 0,
     ) -> Path:
-        header = laspy.LasHeader(point_format=6, version="1.4")
-        header.scales = [1e-7, 1e-7, 1e-3] if epsg == 4326 else [0.001] * 3
-        header.offsets = xyz[0]
-        if epsg is not None:
-            header.add_crs(import_pyproj().CRS.from_epsg(epsg))
-        cloud = laspy.LasData(header)
-        cloud.xyz = xyz
-        cloud.classification = np.full(len(xyz), class_code, dtype=np.uint8)
-        cloud.point_source_id = np.full(len(xyz), strips, dtype=np.uint16)
+        scales = [1e-7, 1e-7, 1e-3] if epsg == 4326 else 0.001
+        values = {"scales": scales, "offsets": xyz[0], "classification": class_code, "point_source_id": strips}
         with chunks_of_any_size() if any_chunk_size else nullcontext():
-            cloud.write(folder / name)
-        return folder / name
+            return write_las(folder / name, xyz, epsg and f"EPSG:{epsg}", **values)
 
     return write
 

@@ -1,10 +1,10 @@
 """Faults of raw clouds, in Classify Rail Points and in Extract Rails with CLASSIFY."""
 
-import laspy
 import numpy as np
 import pytest
 from faults import cancelled, faults, full_disk
 from memory_layers import layer_of
+from rail_extract.laboratory.scenes.las import write_las
 from rail_extract.laboratory.scenes.raw_shapes import flat, rough, with_track
 
 CORNER = np.array([500_000.0, 3_000_000.0, 100.0])
@@ -31,12 +31,8 @@ def ground(bench):
 
 
 def old_format(bench):
-    header = laspy.LasHeader(point_format=1, version="1.2")
-    header.scales, header.offsets = [0.001] * 3, CORNER
-    cloud = laspy.LasData(header)
-    cloud.xyz = ballast() + CORNER
-    cloud.write(bench.folder / "old.las")
-    return {"INPUT": bench.folder / "old.las", "CRS": "EPSG:32643", "RAIL_CLASS": 40}
+    path = write_las(bench.folder / "old.las", ballast() + CORNER, point_format=1)
+    return {"INPUT": path, "CRS": "EPSG:32643", "RAIL_CLASS": 40}
 
 
 def two_names(bench):

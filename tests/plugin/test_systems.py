@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from osgeo import ogr
 from qgis.core import (
     QgsApplication,
     QgsCoordinateReferenceSystem,
@@ -10,7 +9,6 @@ from qgis.core import (
     QgsProcessingUtils,
     QgsProject,
     QgsRasterLayer,
-    QgsVectorLayer,
 )
 from qgis.PyQt.QtCore import QEventLoop, QThread, QThreadPool
 
@@ -75,18 +73,6 @@ def test_memory_layers_keep_theirs(run_apart, context, cloud):
     results = run_apart("extractrails", {"INPUT": path, **dict.fromkeys(OUTPUTS, "TEMPORARY_OUTPUT")})
     for output in OUTPUTS:
         assert_whole(QgsProcessingUtils.mapLayerFromString(results[output], context), name)
-
-
-def test_files_loaded_later_have_theirs(run_apart, cloud, tmp_path):
-    path, name = cloud
-    files = {"RAILS": tmp_path / "rails.gpkg", "CENTERLINES": tmp_path / "c.shp", "CLEANED": tmp_path / "cleaned.tif"}
-    run_apart("extractrails", {"INPUT": path, "RAILS": "TEMPORARY_OUTPUT"})
-    run_apart("extractrails", {"INPUT": path, **files})
-    for output in ("RAILS", "CENTERLINES"):
-        assert_whole(QgsVectorLayer(str(files[output])), name)
-    assert_whole(QgsRasterLayer(str(files["CLEANED"])), name)
-    dataset = ogr.Open(str(files["RAILS"]))
-    assert dataset.GetLayer(0).GetSpatialRef().GetAuthorityCode(None) == name[5:]
 
 
 def test_every_step_keeps_its_own(run_apart, context, cloud, tmp_path):

@@ -28,19 +28,11 @@ DESIGNS = {
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of files.
+    """A kind of files, which may need a module.
 
-    Attributes
-    ----------
-    name : str
-    make : callable
-        Writes good files into a folder, and returns those to be damaged.
-    read : callable
-        Reads a damaged file. It may raise a `RailExtractError`; everything else is a failure.
-    needs : str
-        Module that must be installed.
-    remake : callable, optional
-        Writes a file again with other values, which is done in half of the cases instead of damaging its bytes.
+    `make` writes good files into a folder, and returns those to be damaged; `read` reads a damaged one, and may raise a
+    `RailExtractError`, while everything else is a failure; `remake` writes a file again with other values, which is
+    done in half of the cases instead of damaging its bytes.
     """
 
     name: str
@@ -50,15 +42,7 @@ class Kind:
     remake: Callable[[Path, random.Random], None] | None = None
 
     def mutant(self, folder: Path, good: Sequence[Path], seed: int) -> Path:
-        """Copy the folder of the good files, damage one of them as a seed says, and return its path.
-
-        Parameters
-        ----------
-        folder : Path
-        good : sequence of Path
-            From `make`.
-        seed : int
-        """
+        """Copy the folder of the good files of `make`, damage one of them as a seed says, and return its path."""
         rng = random.Random(f"{self.name}:{seed}")
         path = self.copied(folder, rng.choice(list(good)))
         if self.remake is not None and rng.random() < 0.5:
@@ -92,7 +76,7 @@ def _make_weights(folder: Path) -> list[Path]:
 
 def _read_weights(path: Path) -> None:
     from rail_extract.core.frpdf.architecture import fold
-    from rail_extract.core.frpdf.weights import load_arrays
+    from rail_extract.core.frpdf.models import load_arrays
 
     fold(load_arrays(path))
 
@@ -118,7 +102,7 @@ def _read_spool(path: Path) -> None:
 
 def _spooled(cloud: Path, folder: Path) -> Sequence:
     from rail_extract.core.clouds.points import ask
-    from rail_extract.core.tiles.spool import spool
+    from rail_extract.core.tiles.store import spool
 
     return spool(ask(cloud, [RAIL]), SPOOL_SIDE_M, folder)
 
@@ -129,7 +113,7 @@ def _make_stored(folder: Path) -> list[Path]:
     from rail_extract.core.rails import RailLine
     from rail_extract.core.raster import rasterize
     from rail_extract.core.squares.kept import save
-    from rail_extract.core.squares.pieces import SquareRails
+    from rail_extract.core.squares.seams import SquareRails
     from rail_extract.core.tiles.grid import Square
 
     xyz = np.random.default_rng(0).uniform(0, 20, (500, 3))
@@ -240,9 +224,9 @@ def _read_names(path: Path) -> None:
 
 def _make_moving(folder: Path) -> list[Path]:
     """Write the temporary folder of a run that was killed while it moved the files of a shapefile."""
-    from rail_extract.core import disk, scratch
+    from rail_extract.core import disk
 
-    killed = folder / f"{scratch.PREFIX}{'0' * 12}"
+    killed = folder / f"{disk.PREFIX}{'0' * 12}"
     for name in (disk.NEW, disk.OLD):
         (killed / name).mkdir(parents=True)
         (killed / name / "a.shp").write_bytes(b"shp")
@@ -253,10 +237,10 @@ def _make_moving(folder: Path) -> list[Path]:
 
 def _read_moving(path: Path) -> None:
     """Complete an interrupted move, as the next run does: nothing is written outside of the folder."""
-    from rail_extract.core import disk, scratch
+    from rail_extract.core import disk
 
     folder = path.parents[1]
-    os.utime(path.parent, (0, time.time() - scratch.MIN_UNMARKED_AGE_S - 1))
+    os.utime(path.parent, (0, time.time() - disk.MIN_UNMARKED_AGE_S - 1))
     disk.Destination.at(folder / "next.txt")
     if path.exists():
         raise AssertionError("the temporary folder is still there")

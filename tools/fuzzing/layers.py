@@ -120,7 +120,7 @@ def compact(path: Path) -> None:
 def write_raster(folder: Path) -> list[Path]:
     """Write a small rail raster."""
     from rail_extract.core.clouds.crs import import_pyproj
-    from rail_extract.core.files.raster_file import header_for
+    from rail_extract.core.files.rail_rasters import header_for
     from rail_extract.core.frame import LocalFrame
     from rail_extract.core.raster import rasterize
     from rail_extract.core.standards import STANDARDS
@@ -156,12 +156,7 @@ def read_raster(path: Path) -> None:
 def run(name: str, parameters: dict[str, Any]) -> Iterator[tuple[dict[str, Any], QgsProcessingContext]]:
     """Check the values and run an algorithm, as QGIS does; yields the results and the context with their layers.
 
-    Raises
-    ------
-    RailExtractError
-        What the algorithm refused.
-    AssertionError
-        It failed without an explanation.
+    Raises RailExtractError with what the algorithm refused, AssertionError if it failed without an explanation.
     """
     context, listener = QgsProcessingContext(), Listener()
     try:

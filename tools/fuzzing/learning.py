@@ -8,8 +8,8 @@ import numpy as np
 import torch
 from rail_extract.core.errors import RailExtractError
 from rail_extract.core.labelling.training import EXAMPLES
-from rail_extract.core.learned.examples import Examples, save_index, write_square
-from rail_extract.core.learned.training import Settings, _Run
+from rail_extract.core.learned.blocks import Examples, save_index, write_square
+from rail_extract.core.learned.training import TrainingSettings, _Run
 from rail_extract.laboratory.scenes.raw_shapes import flat, rough, with_track
 
 SIDE_M = 40.0
@@ -41,4 +41,4 @@ def continue_training(path: Path) -> None:
 def _run(folder: Path) -> _Run:
     examples = Examples.load(folder / EXAMPLES)
     every = np.arange(len(examples.index))
-    return _Run(examples, Settings(1), every, every[:1], folder, "cpu")
+    return _Run(examples, TrainingSettings(1), every, every[:1], folder, "cpu")

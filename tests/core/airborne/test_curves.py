@@ -2,9 +2,8 @@
 
 import numpy as np
 import pytest
-from rail_extract.core.airborne.cross_sections import Sections
 from rail_extract.core.airborne.curves import differences, draw_together, smooth
-from rail_extract.core.airborne.ridges import Fit
+from rail_extract.core.airborne.ridges import RidgeFit, Sections
 from rail_extract.core.polyline import Polyline
 
 LENGTH_M, RADIUS_M, APART_M, NOISE_M = 400.0, 450.0, 4.0, 0.06
@@ -23,7 +22,7 @@ def sections(seed, hidden=(), noise_m=NOISE_M):
     shows = np.ones(count, dtype=bool)
     shows[list(hidden)] = False
     nothing = np.zeros(count)
-    return Sections(offset, np.full(count, noise_m), Fit(*[nothing] * 7), nothing, shows)
+    return Sections(offset, np.full(count, noise_m), RidgeFit(*[nothing] * 7), nothing, shows)
 
 
 def errors(line, found, curve):

@@ -4,17 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rail_extract.core.airborne import reading
-from rail_extract.core.airborne.files import survey_files
-from rail_extract.core.airborne.reading import Run
-from rail_extract.core.airborne.remarks import FLIGHT
-from rail_extract.core.airborne.survey import Guide
+from heard import Heard
+from rail_extract.core.airborne import files
+from rail_extract.core.airborne.files import Run, survey_files
+from rail_extract.core.airborne.survey import FLIGHT, GuideLine
+from rail_extract.core.clouds.header import catalogue_text
 from rail_extract.core.clouds.points import ask
-from rail_extract.core.clouds.vpc import catalogue_text
 from rail_extract.core.errors import CloudError, NoRailPointsError, ParameterError
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.parameters import AirborneParameters
-from rail_extract.core.progress import Progress
 from rail_extract.core.run.loop import Runner
 from rail_extract.laboratory.airborne.flight import AirborneCloud
 from rail_extract.laboratory.airborne.write import ORIGIN, las_of, write_airborne
@@ -26,23 +24,12 @@ FOOT_M = 1200 / 3937
 PARAMETERS = AirborneParameters(1.435, 0.072, footprint_m=0.25)
 
 
-class Log(Progress):
-    def __init__(self):
-        self.texts, self.warnings = [], []
-
-    def info(self, text):
-        self.texts.append(text)
-
-    def warning(self, text):
-        self.warnings.append(text)
-
-
 def guides(flown, move=(0.0, 0.0)):
-    return [Guide(number + 1, guide + ORIGIN[:2] + move) for number, guide in enumerate(flown.guides)]
+    return [GuideLine(number + 1, guide + ORIGIN[:2] + move) for number, guide in enumerate(flown.guides)]
 
 
 def survey(paths, given, folder, parameters=PARAMETERS, codes=(1, 2), progress=None):
-    return survey_files(Run(ask(paths, codes), parameters, folder / "points", Runner(), progress or Log()), given)
+    return survey_files(Run(ask(paths, codes), parameters, folder / "points", Runner(), progress or Heard()), given)
 
 
 def write_tiles(cloud, axis, folder):
@@ -61,16 +48,16 @@ def cloud(flown, tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def whole(flown, cloud):
-    log = Log()
-    return survey(cloud, guides(flown), cloud.parent, progress=log), log
+    heard = Heard()
+    return survey(cloud, guides(flown), cloud.parent, progress=heard), heard
 
 
 def test_the_lines_lie_on_the_tracks(flown, whole):
-    found, log = whole
+    found, heard = whole
     assert [line.guide_id for line in found.lines] == [1, 2]
     assert found.seen_m > 0.95 * found.guides_m
     assert found.density == pytest.approx(10, rel=0.15)
-    assert FLIGHT in log.texts
+    assert FLIGHT in heard.infos
     for line, number in zip(found.lines, (0, 1)):
         truth = flown.design.truth(number)
         places = found.frame.to_crs(line.xyz)[:, :2] - ORIGIN[:2]
@@ -82,7 +69,7 @@ def test_figures_are_metres_in_a_cloud_in_feet(flown, whole, tmp_path):
     feet = LocalFrame(np.array([984_250.0, 196_850.0, 500.0]), FOOT_M, FOOT_M, "EPSG:2263+6360")
     write_airborne(flown.cloud, tmp_path / "feet.laz", frame=feet)
     flat = [np.column_stack([one, np.zeros(len(one))]) for one in flown.guides]
-    given = [Guide(number, feet.to_crs(one)[:, :2]) for number, one in enumerate(flat, start=1)]
+    given = [GuideLine(number, feet.to_crs(one)[:, :2]) for number, one in enumerate(flat, start=1)]
     found = survey(tmp_path / "feet.laz", given, tmp_path)
     assert found.density == pytest.approx(whole[0].density, rel=0.05)
     for one, other in zip(found.tracks, whole[0].tracks):
@@ -100,7 +87,7 @@ def test_figures_are_metres_in_a_cloud_in_feet(flown, whole, tmp_path):
 
 
 def test_tiles_and_squares_give_the_lines_of_one_file(flown, whole, tmp_path, monkeypatch):
-    monkeypatch.setattr(reading, "SIDE_M", 180.0)
+    monkeypatch.setattr(files, "SIDE_M", 180.0)
     write_tiles(flown.cloud, 0, tmp_path)
     found = survey(tmp_path, guides(flown), tmp_path)
     assert len(list((tmp_path / "points").glob("*/*"))) >= 3
@@ -146,7 +133,7 @@ def test_every_form_of_a_cloud_gives_the_same_stations(flown, whole, tmp_path, f
             "choose another.",
         ),
         (
-            lambda first, second: [first, second, Guide(3, np.array([second.xy[0], second.xy[0] + [9.0, 0.0]]))],
+            lambda first, second: [first, second, GuideLine(3, np.array([second.xy[0], second.xy[0] + [9.0, 0.0]]))],
             1.435,
             [1, 2],
             "Guide 3 is left out: it is 9.0 m long, too short alone. Join it to the line that it continues.",
@@ -164,7 +151,7 @@ def test_a_guide_outside_of_the_cloud_is_refused(flown, cloud, tmp_path):
     with pytest.raises(ParameterError, match="No guide lies in the cloud"):
         survey(cloud, guides(flown, (5000.0, 0.0)), tmp_path)
     with pytest.raises(ParameterError, match="in degrees"):
-        survey(cloud, [Guide(1, np.array([[9.0, 49.6], [9.001, 49.7]]))], tmp_path)
+        survey(cloud, [GuideLine(1, np.array([[9.0, 49.6], [9.001, 49.7]]))], tmp_path)
 
 
 def test_other_classes_and_dense_clouds_are_refused(flown, tmp_path):

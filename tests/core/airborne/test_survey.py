@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
-from rail_extract.core.airborne.fitting import HIDDEN, SEEN, Stations
-from rail_extract.core.airborne.survey import Guide, gauge_of, joined_others, lines_of, track_of
+from rail_extract.core.airborne.fitting import HIDDEN, SEEN, TrackStations
+from rail_extract.core.airborne.survey import GuideLine, gauge_of, joined_others, lines_of, track_of
 from rail_extract.core.frame import LocalFrame
 
 FRAME = LocalFrame(np.array([500_000.0, 5_500_000.0, 0.0]))
-GUIDE = Guide(7, np.array([[0.0, 0.0], [400.0, 0.0]]), 1.0, "main line", "12")
+GUIDE = GuideLine(7, np.array([[0.0, 0.0], [400.0, 0.0]]), 1.0, "main line", "12")
 
 
 def stations(seen, radius_m=400.0, grade=0.01):
@@ -16,7 +16,7 @@ def stations(seen, radius_m=400.0, grade=0.01):
     xy = radius_m * np.column_stack([np.sin(turn), 1 - np.cos(turn)])
     same = np.ones(len(t))
     reason = np.where(seen, SEEN, HIDDEN)
-    return Stations(t, xy, 100 + grade * t, 0.1 * same, 0.01 * same, 0.004 * same, 9 * same, reason, same < 0)
+    return TrackStations(t, xy, 100 + grade * t, 0.1 * same, 0.01 * same, 0.004 * same, 9 * same, reason, same < 0)
 
 
 def track(seen, **shape):

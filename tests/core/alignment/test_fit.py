@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from rail_extract.core.alignment.elements import Alignment, CantElement, VerticalElement, chained
 from rail_extract.core.alignment.fit import fit_track, fit_tracks
-from rail_extract.core.alignment.held import noted, round_radius
+from rail_extract.core.alignment.layouts import noted, round_radius
 from rail_extract.core.alignment.measured import Track
 from rail_extract.core.errors import ParameterError
 from rail_extract.core.fields import ELEMENT_FIELDS

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from heard import Heard
 from rail_extract.core.checks.lines import displacement, warn_of_rails, with_tracks
 from rail_extract.core.parameters import Parameters
-from rail_extract.core.progress import Progress
 from rail_extract.core.rails import Centerline, RailLine
 from rail_extract.laboratory.curves import Element, trace
 
@@ -24,14 +24,6 @@ def rail(number, xyz):
 
 def track(number, left, right):
     return Centerline(line(0.0, 0.0), number, 10, (left,), (right,), 1435.0, 1.0, 0.0, 0.0, 0.0)
-
-
-class Heard(Progress):
-    def __init__(self):
-        self.warnings = []
-
-    def warning(self, text):
-        self.warnings.append(text)
 
 
 def found(*others):

@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rail_extract.core.checks.gauge_estimate import SEEN_SHARE
+from heard import Heard
+from rail_extract.core.checks.points import SEEN_SHARE
 from rail_extract.core.checks.standard import head_widths, warn_of_gauge, warn_of_raw, warn_of_spacing
 from rail_extract.core.clouds.points import RailPoints
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.parameters import Parameters
-from rail_extract.core.progress import Progress
 from rail_extract.core.rails import RailLine, SearchFigures
 from rail_extract.core.tiles.grid import MemorySource
 from rail_extract.laboratory.curves import Element, trace, transition_curve
@@ -20,17 +20,6 @@ from rail_extract.laboratory.scenes.strips import two_passes
 WIDTH = 0.072
 LINE = trace([Element(40.0)], heading=0.4)
 CURVE = trace(transition_curve(15, 20, 15, 1 / 300), heading=-0.6)
-
-
-class Warnings(Progress):
-    def __init__(self):
-        self.said, self.proposed = [], []
-
-    def warning(self, text):
-        self.said.append(text)
-
-    def propose(self, standard):
-        self.proposed.append(standard)
 
 
 class Sampled:
@@ -57,55 +46,57 @@ def heads_of(curve, width_m, gauge_m=1.435, count=40_000):
     [(1 / 0.3048, "said to be metres, are these feet?"), (0.3048, "said to be feet, are these metres?")],
 )
 def test_coordinates_in_the_wrong_unit_are_recognized(factor, stated):
-    heard = Warnings()
+    heard = Heard()
     warn_of_gauge(Sampled(factor * heads_of(CURVE, WIDTH)), Parameters(1.435, WIDTH), heard)
-    (warning,) = heard.said
+    (warning,) = heard.warnings
     assert stated in warning
     assert ("3.28 times" in warning) == (factor > 1)
 
 
 def test_coordinates_in_the_right_unit_are_no_warning():
-    heard = Warnings()
+    heard = Heard()
     warn_of_gauge(Sampled(heads_of(CURVE, WIDTH)), Parameters(1.435, WIDTH), heard)
-    assert heard.said == []
+    assert heard.warnings == []
 
 
 @pytest.mark.parametrize(("gauge_m", "proposed"), [(1.435, []), (1.52, ["RU_R65_1520"])])
 def test_found_points_of_another_gauge_lead_to_their_standard(gauge_m, proposed):
-    heard, points = Warnings(), RailPoints(heads_of(LINE, 0.075, gauge_m), LocalFrame(np.zeros(3)), 10)
+    heard, points = Heard(), RailPoints(heads_of(LINE, 0.075, gauge_m), LocalFrame(np.zeros(3)), 10)
     assert warn_of_spacing(MemorySource(points, 500.0), Parameters(1.435, WIDTH), heard) == bool(proposed)
     assert heard.proposed == proposed
-    assert [f"Rails are {1000 * gauge_m + 75:.0f} mm apart" in text for text in heard.said] == [True] * len(proposed)
+    assert [f"Rails are {1000 * gauge_m + 75:.0f} mm apart" in text for text in heard.warnings] == [True] * len(
+        proposed
+    )
 
 
 @pytest.mark.parametrize(("width_m", "count"), [(0.062, 1), (0.068, 0), (0.072, 0), (0.076, 0), (0.084, 1)])
 def test_heads_of_another_width_than_stated_are_said(width_m, count):
     points = RailPoints(heads_of(LINE, SEEN_SHARE * width_m), LocalFrame(np.zeros(3)), 10)
-    heard = Warnings()
+    heard = Heard()
     widths = head_widths(MemorySource(points, 500.0), ((1.435, 0.072),), heard)
     assert widths.seen_m == pytest.approx(width_m, abs=0.002)
     assert widths.differ == (count == 1)
-    assert len(heard.said) == count
+    assert len(heard.warnings) == count
     said = "72 mm are stated: is it " if width_m < 0.08 else "72 mm are stated, and no standard has such heads"
-    assert all(said in one for one in heard.said)
+    assert all(said in one for one in heard.warnings)
 
 
 def test_heads_of_another_standard_are_not_said_where_the_gauge_is_another_one():
     points = RailPoints(heads_of(LINE, SEEN_SHARE * 0.062, gauge_m=1.0), LocalFrame(np.zeros(3)), 10)
     for gauge_m, count in ((1.0, 1), (1.435, 0)):
-        heard = Warnings()
+        heard = Heard()
         assert head_widths(MemorySource(points, 500.0), ((gauge_m, 0.072),), heard).differ
-        assert len(heard.said) == count
+        assert len(heard.warnings) == count
 
 
 def test_passes_side_by_side_without_a_mark_are_said():
     scene = two_passes(apart_m=0.016)
     for strips, count in ((None, 1), (scene.rail_points().strips, 0)):
-        heard = Warnings()
+        heard = Heard()
         source = MemorySource(replace(scene.rail_points(), strips=strips), 500.0)
         assert head_widths(source, ((1.435, 0.072),), heard).differ == bool(count)
-        assert len(heard.said) == count
-        assert all("passes of the scanner are not aligned" in text for text in heard.said)
+        assert len(heard.warnings) == count
+        assert all("passes of the scanner are not aligned" in text for text in heard.warnings)
 
 
 def test_noise_and_faces_do_not_widen_heads_and_a_single_face_is_no_head():
@@ -113,12 +104,12 @@ def test_noise_and_faces_do_not_widen_heads_and_a_single_face_is_no_head():
         (from_the_side("all", 39, 60.0, noise_m=0.006, length_m=30.0), ""),
         (from_the_side("one", 44, 20.0, noise_m=0.004, length_m=30.0, top_share=0.0), "one side only"),
     ):
-        heard = Warnings()
+        heard = Heard()
         rails = [RailLine(rail, 1, 10, 1.0, 1.0, 1.0, 0.0) for rail in scene.rails]
         source = MemorySource(scene.rail_points(), 500.0)
         head_widths(source, ((1.435, 0.072),), heard, rails)
-        assert len(heard.said) == bool(said)
-        assert all(said in text for text in heard.said)
+        assert len(heard.warnings) == bool(said)
+        assert all(said in text for text in heard.warnings)
 
 
 def test_blunt_heads_are_said_and_their_width_is_not_measured():
@@ -130,11 +121,11 @@ def test_blunt_heads_are_said_and_their_width_is_not_measured():
     for side in (0.5, -0.5):
         xy = LINE.xy + side * (1.435 + WIDTH) * LINE.left_normal
         rails.append(RailLine(np.column_stack([xy, np.zeros(len(xy))]), 1, 10, 1.0, 1.0, 1.0, 0.0))
-    heard = Warnings()
+    heard = Heard()
     source = MemorySource(RailPoints(points, LocalFrame(np.zeros(3)), 10), 500.0)
     widths = head_widths(source, ((1.435, WIDTH),), heard, rails)
     assert not widths.differ and np.isnan(widths.seen_m)
-    (warning,) = heard.said
+    (warning,) = heard.warnings
     assert warning.startswith("Heads are blunt") and "72 mm" in warning
 
 
@@ -148,7 +139,7 @@ def test_blunt_heads_are_said_and_their_width_is_not_measured():
     ],
 )
 def test_a_search_that_finds_next_to_nothing_says_which_gauge_the_cloud_has(gauge_m, found, proposed):
-    heard = Warnings()
+    heard = Heard()
     is_warned = warn_of_raw(Sampled(strip(12.0).xyz), found, Parameters(gauge_m, WIDTH), heard)
     assert (is_warned, heard.proposed) == (bool(proposed), proposed)
-    assert all("mm apart are expected: is it EN 60E1" in text for text in heard.said)
+    assert all("mm apart are expected: is it EN 60E1" in text for text in heard.warnings)

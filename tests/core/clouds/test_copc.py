@@ -12,6 +12,7 @@ from rail_extract.core.clouds.points import read_rail_points
 from rail_extract.core.clouds.readers import read_classes
 from rail_extract.core.errors import NoRailPointsError
 from rail_extract.laboratory.scenes.copc import write_copc
+from rail_extract.laboratory.scenes.las import las_data
 
 RAIL, HALF_M, LOW = 10, 32.0, np.array([578000.0, 2494000.0, 500.0])
 LEVELS = 4
@@ -19,11 +20,8 @@ LEVELS = 4
 
 def write_cloud(path, count=4000):
     """Write a cloud with an octree; return the position of its page and the number of its entries."""
-    header = laspy.LasHeader(version="1.4", point_format=6)
-    header.scales, header.offsets = [0.001] * 3, LOW
-    cloud = laspy.LasData(header)
-    cloud.xyz = LOW + np.random.RandomState(1).uniform(0, 2 * HALF_M, (count, 3))
-    cloud.classification = np.random.RandomState(3).choice([2, RAIL], count)
+    xyz = LOW + np.random.RandomState(1).uniform(0, 2 * HALF_M, (count, 3))
+    cloud = las_data(xyz, offsets=LOW, classification=np.random.RandomState(3).choice([2, RAIL], count))
     return write_copc(cloud, path, LOW, 2 * HALF_M, LEVELS)
 
 

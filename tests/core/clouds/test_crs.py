@@ -1,8 +1,8 @@
 """Coordinate systems: comparing two descriptions, and the warning about the scale factor."""
 
 import pytest
+from heard import Heard
 from rail_extract.core.clouds.crs import import_pyproj, same_plane, warn_of_scale
-from rail_extract.core.progress import Progress
 
 PLACE = (500_000.0, 3_000_000.0)
 
@@ -28,14 +28,6 @@ def test_other_systems_mean_another_place(first, second):
     assert not same_plane(wkt(f"EPSG:{first}"), wkt(f"EPSG:{second}"), PLACE)
 
 
-class Listener(Progress):
-    def __init__(self):
-        self.said = []
-
-    def warning(self, text):
-        self.said.append(text)
-
-
 ROME, BERN, ACCRA = (12.5, 41.9), (7.4, 46.9), (-0.2, 5.6)
 
 
@@ -46,9 +38,9 @@ def warnings_at(code, *places):
 
 
 def warnings_of(crs, places):
-    listener = Listener()
-    warn_of_scale(crs, places, "It is", listener)
-    return listener.said
+    heard = Heard()
+    warn_of_scale(crs, places, "It is", heard)
+    return heard.warnings
 
 
 @pytest.mark.parametrize(

@@ -9,16 +9,13 @@ from fuzzing.clouds import chunks_of_any_size
 from rail_extract.core.clouds import las, laz
 from rail_extract.core.clouds.readers import read_points
 from rail_extract.core.errors import CloudError
+from rail_extract.laboratory.scenes.las import las_data
 
 
 def write_cloud(path, point_format, count):
     """Write points whose GPS times advance steadily, as those of a scanner."""
-    version = "1.4" if point_format > 5 else "1.2"
-    header = laspy.LasHeader(version=version, point_format=point_format)
-    header.scales = [0.001] * 3
-    cloud = laspy.LasData(header)
-    cloud.xyz = np.random.default_rng(1).uniform(0, 100, (count, 3))
-    if "gps_time" in header.point_format.dimension_names:
+    cloud = las_data(np.random.default_rng(1).uniform(0, 100, (count, 3)), point_format=point_format)
+    if "gps_time" in cloud.point_format.dimension_names:
         cloud.gps_time = 1e8 + 1e-6 * np.arange(count)
     cloud.write(path)
     return np.asarray(cloud.xyz)

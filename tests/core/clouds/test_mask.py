@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from rail_extract.core.clouds.mask import Mask
 from rail_extract.core.clouds.points import ask, read_requested
-from rail_extract.core.tiles.spool import spool
+from rail_extract.core.tiles.store import spool
 
 PLACE = np.array([500_000.0, 3_000_000.0])
 SQUARE = np.array([[0, 0], [30, 0], [30, 30], [0, 30], [0, 0]], dtype=float)

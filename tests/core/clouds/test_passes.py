@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from rail_extract.core.clouds.las import laspy
 from rail_extract.core.clouds.passes import marks_of, number_passes
 from rail_extract.core.clouds.points import ask, read_rail_points
 from rail_extract.core.tiles.grid import Square
-from rail_extract.core.tiles.spool import spool
+from rail_extract.core.tiles.store import spool
+from rail_extract.laboratory.scenes.las import write_las
 
 SPEED, START = 12.0, 3.2e8
 """Metres per second, and a time of adjusted standard GPS."""
@@ -78,13 +78,8 @@ def test_files_and_sorted_files_agree_on_passes(tmp_path, source_id):
     count = 3000
     xyz = np.column_stack([500_000 + random.uniform(0, 90, count), random.uniform(0, 2, count), np.zeros(count)])
     second = random.randint(2, size=count)
-    header = laspy.LasHeader(version="1.4", point_format=6)
-    header.scales, header.offsets = np.full(3, 0.001), xyz[0]
-    cloud = laspy.LasData(header)
-    cloud.x, cloud.y, cloud.z = xyz.T
-    cloud.classification, cloud.point_source_id = np.full(count, 10, np.uint8), np.full(count, source_id, np.uint16)
-    cloud.gps_time = START + 300.0 * second + (xyz[:, 0] - 500_000) / SPEED
-    cloud.write(tmp_path / "a.laz")
+    times = START + 300.0 * second + (xyz[:, 0] - 500_000) / SPEED
+    write_las(tmp_path / "a.laz", xyz, classification=10, point_source_id=source_id, gps_time=times)
     (points,) = read_rail_points(tmp_path / "a.laz", [10])
     np.testing.assert_array_equal(points.strips, 1 + second)
     (source,) = spool(ask(tmp_path / "a.laz", [10]), 41.0, tmp_path)

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import laspy
 import numpy as np
-import pyproj
 import pytest
+from heard import Heard
 from rail_extract.core.clouds import las
 from rail_extract.core.clouds.points import ask, read_rail_points, read_requested
 from rail_extract.core.clouds.readers import first_header
@@ -18,7 +18,7 @@ from rail_extract.core.errors import (
     EmptyCloudError,
     NoRailPointsError,
 )
-from rail_extract.core.progress import Progress
+from rail_extract.laboratory.scenes.las import las_data
 
 RAIL = 10
 UTM = "EPSG:32643"
@@ -28,31 +28,11 @@ PLACE = np.array([578123.0, 2494456.0, 556.0])
 def make_cloud(path, crs=UTM, version="1.4", point_format=6, count=3000, place=PLACE, codes=(1, 2, RAIL), spread=20.0):
     """Write a cloud around a place; return its coordinates as stored, and its classes."""
     random = np.random.RandomState(1)
-    header = laspy.LasHeader(version=version, point_format=point_format)
-    header.scales = [0.001] * 3 if spread > 1 else [1e-9] * 3
-    header.offsets = np.floor(place)
-    if crs is not None:
-        header.add_crs(pyproj.CRS.from_user_input(crs))
-    cloud = laspy.LasData(header)
-    cloud.x, cloud.y, cloud.z = (place + spread * random.standard_normal((count, 3))).T
-    cloud.classification = random.choice(codes, size=count)
+    xyz, codes = place + spread * random.standard_normal((count, 3)), random.choice(codes, size=count)
+    how = {"version": version, "point_format": point_format, "scales": 0.001 if spread > 1 else 1e-9}
+    cloud = las_data(xyz, crs, **how, offsets=np.floor(place), classification=codes)
     cloud.write(path)
     return np.column_stack([cloud.x, cloud.y, cloud.z]), np.asarray(cloud.classification)
-
-
-class Listener(Progress):
-    def __init__(self, cancel_after=None):
-        self.said, self.fractions, self.checks, self.cancel_after = [], [], 0, cancel_after
-
-    def info(self, text):
-        self.said.append(text)
-
-    def set_fraction(self, fraction):
-        self.fractions.append(fraction)
-
-    def is_cancelled(self):
-        self.checks += 1
-        return self.cancel_after is not None and self.checks > self.cancel_after
 
 
 @pytest.mark.parametrize(
@@ -198,11 +178,11 @@ def test_degrees_are_refused_with_the_right_zone(tmp_path, place, zone):
 def test_tiles_without_points_are_left_out(tmp_path, name):
     make_cloud(tmp_path / "1.las")
     laspy.LasData(laspy.LasHeader(point_format=6, version="1.4")).write(tmp_path / name)
-    heard = Listener()
+    heard = Heard()
     (points,) = read_rail_points(tmp_path, [RAIL], progress=heard)
     (alone,) = read_rail_points(tmp_path / "1.las", [RAIL])
     assert len(points.xyz) == len(alone.xyz)
-    assert heard.said == [f"{name} has no points and is left out."]
+    assert heard.infos == [f"{name} has no points and is left out."]
     assert first_header([tmp_path / name, tmp_path / "1.las"]).point_count > 0
     with pytest.raises(EmptyCloudError, match="has no points: leave it out"):
         read_rail_points(tmp_path / name, [RAIL])
@@ -222,13 +202,13 @@ def test_an_extent_selects_points(tmp_path):
 def test_reading_reports_progress_and_can_be_cancelled(tmp_path, monkeypatch):
     make_cloud(tmp_path / "a.las")
     monkeypatch.setattr(las, "CHUNK", 500)
-    listener = Listener()
-    read_rail_points(tmp_path / "a.las", [RAIL], progress=listener)
-    assert listener.fractions == sorted(listener.fractions)
-    assert len(listener.fractions) == 6
-    assert listener.fractions[-1] == pytest.approx(1)
+    heard = Heard()
+    read_rail_points(tmp_path / "a.las", [RAIL], progress=heard)
+    assert heard.fractions == sorted(heard.fractions)
+    assert len(heard.fractions) == 6
+    assert heard.fractions[-1] == pytest.approx(1)
     with pytest.raises(Cancelled):
-        read_rail_points(tmp_path / "a.las", [RAIL], progress=Listener(cancel_after=2))
+        read_rail_points(tmp_path / "a.las", [RAIL], progress=Heard(cancel_after=2))
 
 
 @pytest.mark.parametrize("name", ["a.las", "a.laz"])

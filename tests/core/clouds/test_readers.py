@@ -5,23 +5,19 @@ import os
 
 import laspy
 import numpy as np
-import pyproj
 import pytest
 from rail_extract.core.clouds import readers
 from rail_extract.core.clouds.points import read_rail_points
 from rail_extract.core.errors import CloudError
+from rail_extract.laboratory.scenes.las import las_data
 
 RAIL = 10
 
 
 def write_cloud(path, count=100):
     """Write a cloud whose points are all rail, and return their coordinates as stored."""
-    header = laspy.LasHeader(version="1.4", point_format=6)
-    header.scales, header.offsets = [0.001] * 3, [578_123, 2_494_456, 0]
-    header.add_crs(pyproj.CRS.from_epsg(32643))
-    cloud = laspy.LasData(header)
-    cloud.xyz = header.offsets + np.random.default_rng(1).uniform(0, 20, (count, 3))
-    cloud.classification = np.full(count, RAIL, dtype=np.uint8)
+    xyz = [578_123, 2_494_456, 0] + np.random.default_rng(1).uniform(0, 20, (count, 3))
+    cloud = las_data(xyz, "EPSG:32643", classification=RAIL)
     cloud.write(path)
     return np.array(cloud.xyz)
 
@@ -41,7 +37,7 @@ def test_a_catalogue_may_begin_with_a_byte_order_mark(tmp_path):
 def test_a_tile_that_a_catalogue_repeats_is_looked_up_once(tmp_path, monkeypatch):
     write_cloud(tmp_path / "a.las")
     looked_up, exists = [], os.path.exists
-    monkeypatch.setattr("rail_extract.core.clouds.vpc.os.path.exists", lambda p: looked_up.append(p) or exists(p))
+    monkeypatch.setattr("rail_extract.core.clouds.header.os.path.exists", lambda p: looked_up.append(p) or exists(p))
     assert readers.list_files(write_catalogue(tmp_path / "all.vpc", *["a.las"] * 1000)) == (tmp_path / "a.las",)
     assert looked_up.count(tmp_path / "a.las") == 1
 

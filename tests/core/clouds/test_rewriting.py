@@ -4,6 +4,7 @@ import laspy
 import numpy as np
 import pytest
 from rail_extract.core.clouds.rewriting import rewrite
+from rail_extract.laboratory.scenes.las import las_data
 
 MINOR_VERSION_AT = 25
 
@@ -13,9 +14,7 @@ MINOR_VERSION_AT = 25
 def test_a_version_that_is_not_written_becomes_one_that_has_the_point_format(
     tmp_path, minor, point_format, new, suffix
 ):
-    cloud = laspy.LasData(laspy.LasHeader(version="1.3", point_format=point_format))
-    cloud.header.scales = [0.001] * 3
-    cloud.xyz = np.random.default_rng(1).uniform(0, 5, (100, 3))
+    cloud = las_data(np.random.default_rng(1).uniform(0, 5, (100, 3)), version="1.3", point_format=point_format)
     old, copy = tmp_path / "a.las", tmp_path / f"b{suffix}"
     cloud.write(old)
     data = bytearray(old.read_bytes())

@@ -48,20 +48,6 @@ def test_all_outputs_are_written(flown, tmp_path, capsys):
     assert stations["seen"].sum() >= 14
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (["--centerlines", "out.gpkg"], "--guide is empty: draw lines along the tracks, or import them"),
-        (["--centerlines", "p.gpkg", "--classes", "256"], '--classes "256" must be whole numbers from 0 to 255'),
-    ],
-)
-def test_a_mistake_gets_a_sentence(flown, tmp_path, capsys, monkeypatch, words, message):
-    monkeypatch.chdir(tmp_path)
-    assert main(["airborne", str(flown / "air.laz"), *words]) == 1
-    assert message in capsys.readouterr().err
-    assert not list(tmp_path.iterdir())
-
-
 def test_an_output_that_is_no_longer_made_is_said(flown, tmp_path, capsys):
     assert run(flown, tmp_path, "--workers", "2", "--proposed", str(tmp_path / "proposed.gpkg")) == 0
     said = capsys.readouterr().err

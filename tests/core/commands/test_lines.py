@@ -8,7 +8,7 @@ import pytest
 import rail_extract as rx
 from rail_extract.__main__ import main
 from rail_extract.core.alignment.elements import Alignment, VerticalElement, chained
-from rail_extract.core.errors import ParameterError, RailExtractError
+from rail_extract.core.errors import ParameterError
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.progress import SILENT, Recording
 from rail_extract.laboratory.designs import surveyed
@@ -96,19 +96,6 @@ def test_a_design_is_read_again_and_compared_with_the_track(folder):
     assert "<svg" in (folder / "off.html").read_text()
 
 
-def test_surveys_are_compared(folder, capsys):
-    out = folder / "differences.gpkg"
-    values = [str(folder / "tracks.gpkg"), str(folder / "moved.gpkg"), "--reference-sigma", "0", "--input-sigma", "1"]
-    values += ["--no-ignore-shift", "--output", str(out), "--report", str(folder / "differences.html")]
-    assert main(["compare", *values]) == 0
-    rows, _ = table(out, "differences")
-    np.testing.assert_allclose(rows["height_mm"], 10, atol=0.1)
-    np.testing.assert_allclose(rows["across_mm"], 0, atol=0.1)
-    assert rows["moved"].all()
-    assert "+10.0 mm up" in capsys.readouterr().out
-    assert (folder / "differences.html").stat().st_size > 5000
-
-
 def points(path, places):
     features = [
         {"type": "Feature", "properties": {"name": str(number)}, "geometry": {"type": "Point", "coordinates": place}}
@@ -192,34 +179,3 @@ def test_points_with_kilometres_go_into_a_table_and_polygons_do_not(tmp_path):
     places, axis = layer_of(tmp_path / "areas.json", [shapely.box(500, 1, 600, 9)])
     with pytest.raises(ParameterError, match="out.csv can only have points, or only lines: choose a GeoPackage"):
         rx.station(places, axis, tmp_path / "out.csv", **axis_of)
-
-
-def test_a_table_without_places_is_refused(tmp_path):
-    places, axis = layer_of(tmp_path / "places.json", [None], sign=["A"])
-    with pytest.raises(RailExtractError, match="input is a table without places: give a layer of points"):
-        rx.station(places, axis, tmp_path / "out.gpkg", start_km=2.0)
-
-
-@pytest.mark.parametrize(
-    ("values", "words"),
-    [
-        (["fit-alignment", "nothing.gpkg", "--elements", "out.gpkg"], "can't be read as a vector file"),
-        (
-            ["fit-alignment", "{tracks}", "--elements", "out.gpkg", "--fixed", "{tracks}"],
-            "--fixed is not an element table",
-        ),
-        (["export-alignment", "{tracks}", "--output", "out.xml"], "INPUT is not an element table"),
-        (["export-alignment", "{elements}", "--output", "out.txt"], "let it end in .xml"),
-        (["import-alignment", "{tracks}", "--elements", "out.gpkg"], "GeoPackage"),
-        (["import-alignment", "{xml}", "--deviations", "out.gpkg"], "choose --tracks"),
-        (["compare", "{tracks}", "{tracks}", "--rails", "{tracks}"], "choose --reference-rails, too"),
-        (["station", "{tracks}", "{tracks}", "--output", "out.gpkg"], "AXIS has no M values"),
-        (["station", "{tracks}", "{tracks}", "--output", "out.gpkg", "--posts", "{tracks}"], "--posts has no field"),
-    ],
-)
-def test_bad_input_is_one_sentence(folder, tmp_path, monkeypatch, capsys, values, words):
-    monkeypatch.chdir(tmp_path)
-    known = {"tracks": folder / "tracks.gpkg", "xml": folder / "design.xml", "elements": folder / "out.gpkg"}
-    assert main([value.format(**known) for value in values]) == 1
-    said = capsys.readouterr().err.strip().splitlines()
-    assert words in said[-1]

@@ -14,6 +14,7 @@ from rail_extract.core.pipeline.sources import Grown, Raw
 from rail_extract.core.run import processes
 from rail_extract.core.run.loop import Runner
 from rail_extract.core.standards import SEARCHED_CLASSES
+from rail_extract.laboratory.scenes.las import write_las
 from rail_extract.laboratory.scenes.raw_shapes import MIDDLE, flat, rough, with_track
 from rail_extract.laboratory.scenes.raw_strips import SPACING_M, strip
 
@@ -25,14 +26,7 @@ X, Y = CORNER[:2] + STRIP.at(7.0, SPACING_M / 2)
 @pytest.fixture
 def save(tmp_path):
     def save(xyz, name="raw.laz", crs=None):
-        header = laspy.LasHeader(point_format=6, version="1.4")
-        header.scales, header.offsets = [0.0005] * 3, CORNER
-        if crs:
-            header.add_crs(pyproj.CRS(crs))
-        cloud = laspy.LasData(header)
-        cloud.x, cloud.y, cloud.z = (xyz + CORNER).T
-        cloud.write(tmp_path / name)
-        return tmp_path / name
+        return write_las(tmp_path / name, xyz + CORNER, crs, offsets=CORNER, scales=0.0005)
 
     return save
 
@@ -138,20 +132,10 @@ def test_only_the_track_along_the_guide_is_classified(save, tmp_path, capsys, le
     assert ("No track has the guide within 0.5 m of its middle" in capsys.readouterr().err) == (not found)
 
 
-def test_a_guide_across_the_tracks_is_noticed(save, tmp_path, capsys):
-    guide = geojson(tmp_path / "guide.json", along_track(angle=1.8))
-    options = ["--guide", guide, "--crs", "EPSG:32632"]
-    assert main(["classify", str(save(scene()[0])), "--output", str(tmp_path / "new.las"), *options]) == 0
-    assert "The guide crosses the tracks: " in capsys.readouterr().err
-
-
 @pytest.mark.parametrize(
     ("options", "message"),
     [
         (["--only-guided"], "--only-guided needs lines to compare tracks with: choose --guide."),
-        (["--workers", "-1"], "--workers can't be -1: give a number from 0 to 1,000."),
-        (["--workers", "1001"], "--workers can't be 1001: give a number from 0 to 1,000."),
-        (["--rail-class", "256"], "--rail-class can't be 256: give a number from 0 to 255."),
         (["--guide", "nothing.json"], "nothing.json can't be read as a vector file: give a GeoPackage or GeoJSON"),
         (["--guide", "far.json"], "The guide has no line within 4 m of the cloud: check its place and coordinate"),
         (["--guide", "empty.json"], "--guide has no lines: give a line layer."),
@@ -169,7 +153,7 @@ def test_each_mistake_of_a_search_gets_a_sentence(save, tmp_path, capsys, monkey
 
 @pytest.fixture
 def raw(save):
-    return str(save(STRIP.xyz, "raw.las", 25832))
+    return str(save(STRIP.xyz, "raw.las", "EPSG:25832"))
 
 
 def test_a_copy_has_the_rail_that_grew_from_a_seed(raw, tmp_path, capsys):
@@ -233,10 +217,6 @@ def test_rails_grow_and_are_extracted_in_one_call(save, tmp_path):
         (["--seed", "5"], '--seed "5" should be two numbers: x,y.'),
         (["--seed", "nan,5"], '--seed "nan,5" should be two numbers: x,y.'),
         (["--seed", "1e300,5"], '--seed "1e300,5" should be two numbers: x,y.'),
-        (["--seed", "1,2"], "No seed is in the cloud"),
-        (["--seed", f"{X},{Y}", "--max-outliers", "-1"], "--max-outliers can't be -1: give a number from 0 to 1,000."),
-        (["--seed", f"{X},{Y}", "--stops", "a.shp"], "--stops can't be a.shp: let it end in .gpkg or .dxf or .csv."),
-        (["--seed", f"{X},{Y}", "--rail-class", "300"], "--rail-class can't be 300: give a number from 0 to 255."),
     ],
 )
 def test_each_mistake_of_a_growth_gets_a_sentence(raw, tmp_path, capsys, options, message):

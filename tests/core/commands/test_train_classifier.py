@@ -5,11 +5,9 @@ import numpy as np
 import pytest
 from rail_extract.__main__ import INTERRUPTED, main
 from rail_extract.core.classify.settings import Settings
-from rail_extract.laboratory.scenes.raw_shapes import track_beside_kerb
-
-torch = pytest.importorskip("torch")
-
 from rail_extract.laboratory.ruler.whole_clouds import classify_cloud  # noqa: E402
+from rail_extract.laboratory.scenes.las import write_las
+from rail_extract.laboratory.scenes.raw_shapes import track_beside_kerb
 
 SIDE_M = Settings((1.435,), 0.072).side_m
 CORNER = np.array([round(500_000 / SIDE_M) * SIDE_M, round(5_000_000 / SIDE_M) * SIDE_M, 100.0])
@@ -21,13 +19,7 @@ pytestmark = pytest.mark.usefixtures("small_training")
 @pytest.fixture
 def save(tmp_path):
     def save(name, xyz, codes):
-        header = laspy.LasHeader(point_format=6, version="1.4")
-        header.scales, header.offsets = [0.0005] * 3, CORNER
-        cloud = laspy.LasData(header)
-        cloud.x, cloud.y, cloud.z = (xyz + CORNER).T
-        cloud.classification = codes
-        cloud.write(tmp_path / name)
-        return str(tmp_path / name)
+        return str(write_las(tmp_path / name, xyz + CORNER, offsets=CORNER, scales=0.0005, classification=codes))
 
     return save
 
@@ -79,52 +71,6 @@ def test_a_training_continues_after_its_time(labelled, tmp_path, capsys):
         assert "rails_training holds another training, with other clouds or settings" in capsys.readouterr().err
     assert main(words) == 0
     assert weights.exists() and not folder.exists()
-
-
-def labels(change):
-    def make(save):
-        xyz, on = track_beside_kerb(400)
-        xyz, codes = change(xyz, np.where(on, 10, 2))
-        return [save("labelled.laz", xyz, codes)]
-
-    return make
-
-
-FAULTS = {
-    "no labels": (labels(lambda xyz, codes: (xyz, codes * 0)), [], "The cloud has no points of class 10 to learn from"),
-    "one class": (labels(lambda xyz, codes: (xyz, codes * 0 + 10)), [], "All points of the cloud are of class 10"),
-    "flat": (
-        labels(lambda xyz, codes: (xyz * [1, 1, 0.1], codes)),
-        [],
-        "No point of class 10 is 0.055 to 0.4 m above the bed, where railheads are",
-    ),
-    "one place": (
-        labels(lambda xyz, codes: (xyz[(xyz[:, :2] < 20).all(axis=1)], codes[(xyz[:, :2] < 20).all(axis=1)])),
-        [],
-        "The labelled rails all lie in one place of 20 m: give a longer labelled cloud",
-    ),
-    "suffix": (labels(lambda xyz, codes: (xyz, codes)), ["--weights", "w.pt"], "w.pt is not a name for weights"),
-    "card": (
-        labels(lambda xyz, codes: (xyz, codes)),
-        ["--weights", "w.npz", "--card", "./w.npz"],
-        "let it end in .html",
-    ),
-    "epochs": (
-        labels(lambda xyz, codes: (xyz, codes)),
-        ["--epochs", "0"],
-        "--epochs can't be 0: give a number from 1",
-    ),
-}
-
-
-@pytest.mark.parametrize("fault", FAULTS)
-def test_labels_from_which_nothing_can_be_learned_are_refused(fault, save, tmp_path, capsys):
-    make, more, message = FAULTS[fault]
-    files = make(save)
-    weights = tmp_path / "out" / "rails.npz"
-    assert main(["train-classifier", *files, "--weights", str(weights), *more]) == 1
-    assert message in capsys.readouterr().err
-    assert not weights.parent.exists() or not list(weights.parent.iterdir())
 
 
 def test_a_method_with_the_weights_of_something_else_is_refused(labelled, tmp_path, capsys):

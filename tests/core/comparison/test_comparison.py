@@ -2,14 +2,13 @@
 
 import numpy as np
 import pytest
+from heard import Heard
 from hypothesis import given
 from hypothesis import strategies as st
-from rail_extract.core.comparison.pieces import cut, spacing_and_cant
-from rail_extract.core.comparison.shift import find_shift
+from rail_extract.core.comparison.measures import cut, find_shift, spacing_and_cant
 from rail_extract.core.comparison.tracks import Survey, SurveyedLine, compare_surveys
 from rail_extract.core.errors import Cancelled
 from rail_extract.core.parameters import ComparisonParameters
-from rail_extract.core.progress import Progress
 from rail_extract.core.rails import RailLine
 
 SPACING_M = 1.507
@@ -173,16 +172,9 @@ def test_nearest_places_and_cross_sections():
 
 
 def test_a_long_line_is_compared_in_parts_and_can_be_cancelled():
-    class Impatient(Progress):
-        checks = 0
-
-        def is_cancelled(self):
-            self.checks += 1
-            return self.checks > 4
-
     long = np.column_stack([np.arange(0, 3001.0, 5), np.zeros((601, 2))])
     found = compare(survey(long), survey(long + [0, 0.01, 0]))
     np.testing.assert_allclose(found.lines[0].across_mm, 10)
     assert len(found.lines[0].state) == 3001
     with pytest.raises(Cancelled):
-        compare_surveys(survey(long), survey(long), ComparisonParameters(), Impatient())
+        compare_surveys(survey(long), survey(long), ComparisonParameters(), Heard(cancel_after=4))

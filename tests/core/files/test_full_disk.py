@@ -13,7 +13,7 @@ from rail_extract.core.disk import Destination
 from rail_extract.core.errors import DiskError
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.raster import rasterize
-from rail_extract.core.files.raster_file import header_for, write_rasters
+from rail_extract.core.files.rail_rasters import header_for, write_rasters
 from rail_extract.core.standards import STANDARDS
 resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))
 raster = rasterize(np.random.RandomState(1).uniform(0, 80, (200_000, 2)), 0.04)

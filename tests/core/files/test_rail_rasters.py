@@ -6,9 +6,14 @@ import numpy as np
 import pytest
 from rail_extract.core.clouds.crs import import_pyproj
 from rail_extract.core.errors import ModelError, ParameterError, RasterError
-from rail_extract.core.files import raster_file
-from rail_extract.core.files.rail_rasters import RasterSource, open_with_rasterio
-from rail_extract.core.files.raster_file import header_for, on_one_grid, write_rasters
+from rail_extract.core.files import rail_rasters
+from rail_extract.core.files.rail_rasters import (
+    RasterSource,
+    header_for,
+    on_one_grid,
+    open_with_rasterio,
+    write_rasters,
+)
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.frpdf.cleanup import clean
 from rail_extract.core.jobs.frpdf_cleanup import model_for
@@ -21,6 +26,9 @@ rasterio = pytest.importorskip("rasterio")
 
 STANDARD = STANDARDS["EN_60E1_1435"]
 CELL_M = cell_size(STANDARD.gauge_m, STANDARD.head_width_m)
+
+from rail_extract.core.raster import cell_size  # noqa: E402
+from rail_extract.core.standards import STANDARDS  # noqa: E402
 
 
 def source(path):
@@ -165,7 +173,7 @@ def test_model_by_name_by_tag_and_by_ratio(geotiff):
 
 def test_limit_counts_blocks(monkeypatch):
     raster = rasterize(strokes(), CELL_M)
-    monkeypatch.setattr(raster_file, "MAX_BLOCKS", 3)
+    monkeypatch.setattr(rail_rasters, "MAX_BLOCKS", 3)
     with pytest.raises(RasterError, match="set EXTENT"):
         header_for([raster], (10,), frame_in("EPSG:32643"), STANDARD)
 
@@ -195,3 +203,45 @@ def test_a_damaged_block_is_named(tmp_path):
     path.write_bytes(whole[: len(whole) // 2] + bytes(len(whole) - len(whole) // 2))
     with pytest.raises(RasterError, match=r"r.tif (is damaged at row \d+, column \d+: create it again|.* readable)"):
         source(path).read()
+
+
+def line(length_m, slope=0.5):
+    along = np.arange(0, length_m, 0.02)
+    return np.column_stack([along, slope * along])
+
+
+@pytest.mark.parametrize(
+    ("crs", "unit_m", "epsg"), [("EPSG:25832", 1.0, 25832), ("EPSG:2227", 1200 / 3937, 2227), (None, 1.0, None)]
+)
+def test_each_class_is_a_band_at_its_place(tmp_path, crs, unit_m, epsg):
+    frame = LocalFrame(np.array([5000.0, 7000.0, 0.0]), unit_m, unit_m, crs)
+    rasters = [rasterize(xy, CELL_M) for xy in (line(60), line(40, -0.3))]
+    header = header_for(rasters, (10, 17), frame, STANDARD, (1.5, 2.0, 3.0, 4.25))
+    write_rasters(tmp_path / "out.tif", header, rasters)
+    with rasterio.open(tmp_path / "out.tif") as file:
+        assert (file.crs and file.crs.to_epsg()) == epsg
+        assert file.descriptions == ("10", "17")
+        assert (file.nodata, file.dtypes, file.block_shapes) == (0, ("uint8",) * 2, [(1024, 1024)] * 2)
+        tags = {name: text for name, text in file.tags().items() if name.startswith("RAIL")}
+        extent = "1.5,2.0,3.0,4.25"
+        assert tags == {"RAIL_GAUGE_MM": "1435", "RAIL_HEAD_MM": "72", "RAIL_MODEL": "fast", "RAIL_EXTENT": extent}
+        for band, raster in enumerate(rasters, start=1):
+            cells = np.argwhere(file.read(band) == 1)
+            assert len(cells) == raster.count()
+            place = file.transform
+            y, x = place.f + place.e * (cells[:, 0] + 0.5), place.c + place.a * (cells[:, 1] + 0.5)
+            expected = frame.to_crs(np.column_stack([raster.to_local(raster.cells()), np.zeros(len(cells))]))
+            np.testing.assert_allclose(np.sort(x), np.sort(expected[:, 0]), rtol=0, atol=1e-6)
+            np.testing.assert_allclose(np.sort(y), np.sort(expected[:, 1]), rtol=0, atol=1e-6)
+
+
+def test_empty_blocks_take_no_space(tmp_path):
+    ends = np.concatenate([line(10), [7000.0, 7000.0] + line(10)])
+    raster = rasterize(ends, CELL_M)
+    header = header_for([raster], (10,), LocalFrame(np.zeros(3), crs_wkt="EPSG:25832"), STANDARD)
+    assert header.window[2] * header.window[3] > 30e9
+    write_rasters(tmp_path / "out.tif", header, [raster])
+    assert (tmp_path / "out.tif").stat().st_size < 1_000_000
+    with rasterio.open(tmp_path / "out.tif") as file:
+        last = rasterio.windows.Window(file.width - 4 * TILE, 0, 4 * TILE, 4 * TILE)
+        assert np.count_nonzero(file.read(1, window=last)) > 100

@@ -1,10 +1,10 @@
-"""Pieces and fields cover the cells that the network may set, once, and few others."""
+"""Pieces and batches cover the cells that the network may set, once, and few others."""
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from rail_extract.core.frpdf.corridor import BLOCK, CONTEXT, GAP, MAX_PIECE_CELLS, corridor, lay_fields
+from rail_extract.core.frpdf.corridor import BLOCK, CONTEXT, GAP, MAX_PIECE_CELLS, corridor, lay_batches
 from rail_extract.core.raster import RailRaster, rasterize
 
 CELL_M = 0.04
@@ -29,13 +29,13 @@ places = st.lists(st.tuples(st.integers(-3000, 3000), st.integers(-3000, 3000)),
 def test_pieces_hold_the_corridor_and_do_not_overlap(cells):
     raster = raster_of(cells)
     blocks = corridor(raster)
-    (field,) = lay_fields(raster, 1 << 40)
-    holders = sum(piece.holds(blocks * BLOCK).astype(int) for piece in field.pieces)
+    (batch,) = lay_batches(raster, 1 << 40)
+    holders = sum(piece.holds(blocks * BLOCK).astype(int) for piece in batch.pieces)
     assert (holders == 1).all()
-    assert field.inside.holds(blocks * BLOCK).all()
-    assert all(piece.height * piece.width <= MAX_PIECE_CELLS for piece in field.pieces)
+    assert batch.inside.holds(blocks * BLOCK).all()
+    assert all(piece.height * piece.width <= MAX_PIECE_CELLS for piece in batch.pieces)
     near = np.array(cells)[:, None] + np.array([[-BLOCK, -BLOCK], [0, 0], [BLOCK, BLOCK]])
-    assert sum(piece.holds(near.reshape(-1, 2)).astype(int) for piece in field.pieces).min() == 1
+    assert sum(piece.holds(near.reshape(-1, 2)).astype(int) for piece in batch.pieces).min() == 1
 
 
 @given(st.floats(2, GAP - np.sqrt(2)), st.floats(0, 2 * np.pi))
@@ -51,27 +51,27 @@ def test_nothing_is_computed_in_longer_gaps():
     assert len(far) == 18
 
 
-def test_fields_divide_the_corridor_and_have_context():
+def test_batches_divide_the_corridor_and_have_context():
     raster = double_track(100.0, 0.4)
     blocks = corridor(raster)
-    fields = lay_fields(raster, 100_000)
-    assert len(fields) > 4
-    holders = sum(field.inside.holds(blocks * BLOCK).astype(int) for field in fields)
+    batches = lay_batches(raster, 100_000)
+    assert len(batches) > 4
+    holders = sum(batch.inside.holds(blocks * BLOCK).astype(int) for batch in batches)
     assert (holders == 1).all()
-    for field in fields:
-        corner = np.array([field.inside.row, field.inside.column]) - CONTEXT
-        end = corner + 2 * CONTEXT + [field.inside.height, field.inside.width]
+    for batch in batches:
+        corner = np.array([batch.inside.row, batch.inside.column]) - CONTEXT
+        end = corner + 2 * CONTEXT + [batch.inside.height, batch.inside.width]
         near = blocks[((blocks * BLOCK >= corner) & (blocks * BLOCK < end)).all(axis=1)]
-        assert sum(piece.holds(near * BLOCK).astype(int) for piece in field.pieces).min() == 1
+        assert sum(piece.holds(near * BLOCK).astype(int) for piece in batch.pieces).min() == 1
 
 
 @pytest.mark.parametrize("heading", [0.0, 0.4, np.pi / 4, np.pi / 2])
 def test_pieces_follow_a_track_in_any_direction(heading):
     raster = double_track(300.0, heading)
-    (field,) = lay_fields(raster, 1 << 40)
-    cells = sum(piece.height * piece.width for piece in field.pieces)
+    (batch,) = lay_batches(raster, 1 << 40)
+    cells = sum(piece.height * piece.width for piece in batch.pieces)
     assert cells < 1.4 * BLOCK**2 * len(corridor(raster))
 
 
-def test_an_empty_raster_has_no_fields():
-    assert lay_fields(RailRaster({}, CELL_M, 0.0, 0.0), 1 << 22) == []
+def test_an_empty_raster_has_no_batches():
+    assert lay_batches(RailRaster({}, CELL_M, 0.0, 0.0), 1 << 22) == []

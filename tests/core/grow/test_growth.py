@@ -2,14 +2,13 @@
 
 import numpy as np
 import pytest
+from heard import Heard
 from hypothesis import given, settings
 from hypothesis import strategies as some
 from rail_extract.core.errors import Cancelled
-from rail_extract.core.grow.follow import Reason
-from rail_extract.core.grow.growth import grow
-from rail_extract.core.grow.settings import GrowSettings
+from rail_extract.core.grow.growth import Reason, grow
+from rail_extract.core.grow.heads import GrowSettings
 from rail_extract.core.parameters import GrowParameters
-from rail_extract.core.progress import Progress
 from rail_extract.laboratory.ruler.whole_clouds import GrowingCloud
 from rail_extract.laboratory.scenes.raw_strips import GAUGE_M, SPACING_M, WIDTH_M, strip
 
@@ -139,13 +138,9 @@ def test_a_turned_cloud_gives_the_same_points(turn):
 
 
 def test_it_can_be_cancelled():
-    class Impatient(Progress):
-        def is_cancelled(self):
-            return True
-
     track = strip(10.0)
     with pytest.raises(Cancelled):
-        grow(GrowingCloud(track.xyz, growing()).heads, track.at(5.0, SPACING_M / 2), growing(), Impatient())
+        grow(GrowingCloud(track.xyz, growing()).heads, track.at(5.0, SPACING_M / 2), growing(), Heard(cancel_after=0))
 
 
 @pytest.mark.parametrize(("length", "found"), [(4.0, False), (7.0, True)])

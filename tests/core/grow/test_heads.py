@@ -3,10 +3,8 @@
 import numpy as np
 import pytest
 from rail_extract.core.grow import heads as module
-from rail_extract.core.grow.follow import Reason
-from rail_extract.core.grow.growth import grow
-from rail_extract.core.grow.heads import heads_in
-from rail_extract.core.grow.settings import DENSE, THIN, GrowSettings
+from rail_extract.core.grow.growth import Reason, grow
+from rail_extract.core.grow.heads import DENSE, THIN, GrowSettings, heads_in
 from rail_extract.core.polyline import length_along
 from rail_extract.laboratory.ruler.lines import cut
 from rail_extract.laboratory.ruler.whole_clouds import GrowingCloud

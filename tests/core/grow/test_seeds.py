@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as some
-from rail_extract.core.grow.follow import Reason
-from rail_extract.core.grow.growth import APART, Growths, apart_first
-from rail_extract.core.grow.settings import GrowSettings
+from rail_extract.core.grow.growth import APART, Growths, Reason, apart_first
+from rail_extract.core.grow.heads import GrowSettings
 from rail_extract.core.parameters import GrowParameters
 from rail_extract.laboratory.ruler.whole_clouds import GrowingCloud
 from rail_extract.laboratory.scenes.raw_strips import GAUGE_M, SPACING_M, WIDTH_M, strip

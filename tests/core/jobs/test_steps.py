@@ -3,12 +3,11 @@
 import numpy as np
 import pytest
 import rail_extract as rx
+from rail_extract.laboratory.scenes.las import write_las
 
 pyogrio, shapely = pytest.importorskip("pyogrio"), pytest.importorskip("shapely")
 pytest.importorskip("rasterio")
-laspy = pytest.importorskip("laspy")
 
-from rail_extract.core.clouds.crs import import_pyproj  # noqa: E402
 from rail_extract.core.files.rail_rasters import RasterSource, open_with_rasterio  # noqa: E402
 
 HOW = {"iterations": 1, "engine": "OPENCV"}
@@ -39,14 +38,8 @@ def cloud(tmp_path):
     """Write railheads in a coordinate system."""
 
     def write(points, name="cloud.las", class_code=10, epsg=32643):
-        header = laspy.LasHeader(point_format=6, version="1.4")
-        header.scales, header.offsets = [0.001] * 3, np.floor(points.min(axis=0))
-        header.add_crs(import_pyproj().CRS.from_epsg(epsg))
-        written = laspy.LasData(header)
-        written.x, written.y, written.z = points.T
-        written.classification[:] = class_code
-        written.write(tmp_path / name)
-        return tmp_path / name
+        where = {"offsets": np.floor(points.min(axis=0))}
+        return write_las(tmp_path / name, points, f"EPSG:{epsg}", **where, classification=class_code)
 
     return write
 

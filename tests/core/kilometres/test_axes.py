@@ -2,10 +2,9 @@
 
 import numpy as np
 import pytest
-from rail_extract.core.kilometres.axes import AxisLine, Post, Start, make_axes
+from rail_extract.core.kilometres.axes import AxisLine, AxisStart, Post, make_axes
 from rail_extract.core.kilometres.line import locate
-from rail_extract.core.kilometres.stationing import Jump
-from rail_extract.core.kilometres.text import HECTOMETRES
+from rail_extract.core.kilometres.stationing import HECTOMETRES, Jump
 
 
 def line(*x, m=None, name="", y=0.0):
@@ -40,13 +39,13 @@ def test_a_repeated_vertex_with_another_m_value_is_a_jump():
 
 
 def test_a_first_kilometre_with_either_direction():
-    assert kilometres(make_axes([line(0, 1000)], Start(7.0)), 100) == ([7.1], ["left"])
-    assert kilometres(make_axes([line(0, 1000)], Start(7.0, decreasing=True)), 100) == ([6.9], ["right"])
-    assert kilometres(make_axes([line(0, 1000, m=[1.0, 2.0])], Start(7.0)), 100)[0] == [7.1]
+    assert kilometres(make_axes([line(0, 1000)], AxisStart(7.0)), 100) == ([7.1], ["left"])
+    assert kilometres(make_axes([line(0, 1000)], AxisStart(7.0, decreasing=True)), 100) == ([6.9], ["right"])
+    assert kilometres(make_axes([line(0, 1000, m=[1.0, 2.0])], AxisStart(7.0)), 100)[0] == [7.1]
 
 
 def test_lines_of_one_axis_that_follow_each_other_are_joined():
-    axes = make_axes([line(400, 1000), line(0, 150), line(150, 400)], Start(7.0))
+    axes = make_axes([line(400, 1000), line(0, 150), line(150, 400)], AxisStart(7.0))
     assert len(axes.axes) == 1
     assert kilometres(axes, 50, 300, 900)[0] == [7.05, 7.3, 7.9]
 

@@ -5,8 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from rail_extract.core.kilometres.line import KilometreLine, locate
-from rail_extract.core.kilometres.stationing import stationing_of
-from rail_extract.core.kilometres.text import HECTOMETRES
+from rail_extract.core.kilometres.stationing import HECTOMETRES, stationing_of
 from rail_extract.core.polyline import length_along
 
 RADIUS_M = 500.0
@@ -81,6 +80,14 @@ def test_a_place_between_two_arms_of_a_hairpin_is_ambiguous():
     found = locate([axis], np.array([[100.0, 48.0], [100.0, 40.0], [100.0, 10.0], [300.0, 50.0]]), HECTOMETRES)
     assert found.ambiguous.tolist() == [True, False, False, True]
     np.testing.assert_allclose(found.km[:3], 0.1, atol=1e-5)
+
+
+def test_on_a_ring_kilometres_run_once_round_and_either_end_is_meant_where_it_closes():
+    angle = np.linspace(0, 2 * np.pi, 2001)
+    axis = axis_of(on_circle(angle), 1.0)
+    found = locate([axis], on_circle(np.array([0.5 * np.pi, 1.5 * np.pi, 0.001]), 2.0), HECTOMETRES)
+    np.testing.assert_allclose(found.km[:2], 1 + axis.line.length_m / 1000 * np.array([0.25, 0.75]), atol=2e-5)
+    assert found.ambiguous.tolist() == [False, False, True]
 
 
 def test_the_nearest_of_two_axes_counts():

@@ -5,20 +5,20 @@ import sys
 import numpy as np
 import pytest
 from rail_extract.core.classify.settings import Settings
+from rail_extract.core.clouds.header import list_tiles
 from rail_extract.core.clouds.las import laspy
 from rail_extract.core.clouds.points import ask
-from rail_extract.core.clouds.vpc import list_tiles
-from rail_extract.core.errors import Cancelled, CloudError, DiskError, ParameterError, RailExtractError
-from rail_extract.core.labelling.files import Choice, classify_files, plan_output
+from rail_extract.core.disk import scratch_folder
+from rail_extract.core.errors import CloudError, DiskError, RailExtractError
+from rail_extract.core.labelling.files import Content, classify_files, plan_output
 from rail_extract.core.progress import Progress, Recording
 from rail_extract.core.run.loop import Answer, InTurn, Runner
-from rail_extract.core.scratch import scratch_folder
 from rail_extract.core.standards import SEARCHED_CLASSES
 from rail_extract.laboratory.scenes.raw_shapes import flat, rough, with_track
 
 GAUGE, WIDTH = 1.435, 0.072
 SETTINGS = Settings((GAUGE,), WIDTH)
-TEN = Choice(10)
+TEN = Content(10)
 CORNER = np.array([500_000.0, 5_000_000.0, 100.0])
 
 
@@ -116,10 +116,10 @@ def test_the_rail_class_is_reset_or_kept_and_other_points_are_left_out(tmp_path,
     source = save(tmp_path / "raw.las", xyz, codes=codes)
     counts = {}
     for name, choice in {
-        "reset": Choice(11),
-        "kept": Choice(10, reset=False),
+        "reset": Content(11),
+        "kept": Content(10, reset=False),
         "ten": TEN,
-        "only": Choice(12, only_rails=True),
+        "only": Content(12, only_rails=True),
     }.items():
         result, _ = classify(tmp_path, [source], tmp_path / f"{name}.las", choice)
         counts[name] = np.bincount(laspy.read(result.file).classification, minlength=20), result.figures.points
@@ -231,16 +231,6 @@ def test_rails_without_their_bed_are_not_found_and_the_warning_says_why(tmp_path
     )
 
 
-def test_what_cannot_be_done_is_refused(tmp_path, scene):
-    source = save(tmp_path / "raw.las", scene[0], point_format=1)
-    with pytest.raises(ParameterError, match="raw.las has point format 1, whose classes end at 31"):
-        plan_output([source], tmp_path / "new.las", 40)
-    with pytest.raises(ParameterError, match="would replace the cloud that is read"):
-        plan_output([source], source, 10)
-    with pytest.raises(ParameterError, match="new.txt is not a name for the classified cloud"):
-        plan_output([source], tmp_path / "new.txt", 10)
-
-
 @pytest.mark.parametrize("count", [1, 2])
 def test_of_two_runs_onto_one_output_the_later_one_says_so_and_changes_nothing(tmp_path, scene, count):
     sources = [save(tmp_path / f"raw{number}.las", scene[0][:20_000]) for number in range(count)]
@@ -258,31 +248,9 @@ def test_of_two_runs_onto_one_output_the_later_one_says_so_and_changes_nothing(t
     run(TEN, first)
     written = content()
     with pytest.raises(DiskError, match="was changed by another program in the meantime"):
-        run(Choice(11), second)
+        run(Content(11), second)
     assert content() == written
     assert [path.name for path in tmp_path.glob("*_new*")] == (["new_new.las"] if count == 1 else [])
-
-
-def test_coordinates_in_another_unit_are_refused(tmp_path, scene):
-    source = save(tmp_path / "raw.las", (scene[0] - CORNER) * 1000 + CORNER)
-    with pytest.raises(CloudError, match="too far apart for rails: if the coordinates are in centimetres"):
-        classify(tmp_path, [source], tmp_path / "new.las")
-
-
-def test_a_cancelled_run_leaves_nothing(tmp_path, scene):
-    class Impatient(Progress):
-        fraction = 0.0
-
-        def set_fraction(self, fraction):
-            self.fraction = fraction
-
-        def is_cancelled(self):
-            return self.fraction > 0.6
-
-    source = save(tmp_path / "raw.las", scene[0])
-    with pytest.raises(Cancelled):
-        classify(tmp_path, [source], tmp_path / "new.las", progress=Impatient())
-    assert sorted(one.name for one in tmp_path.iterdir()) == ["raw.las"]
 
 
 def test_a_copc_file_loses_only_the_records_of_its_octree(tmp_path, scene):

@@ -2,53 +2,37 @@
 
 import numpy as np
 import pytest
+from heard import Heard
+from rail_extract.core.clouds.header import list_tiles
 from rail_extract.core.clouds.las import laspy
 from rail_extract.core.clouds.points import ask
-from rail_extract.core.clouds.vpc import list_tiles
-from rail_extract.core.errors import ParameterError, RailExtractError
+from rail_extract.core.disk import scratch_folder
 from rail_extract.core.grow import growth as many_seeds
-from rail_extract.core.grow.follow import Reason
-from rail_extract.core.grow.settings import GrowSettings
+from rail_extract.core.grow.growth import Reason
+from rail_extract.core.grow.heads import GrowSettings
 from rail_extract.core.grow.start import find_start
-from rail_extract.core.labelling.files import Choice, plan_output
+from rail_extract.core.labelling.files import Content, plan_output
 from rail_extract.core.labelling.growing import grow_files
 from rail_extract.core.parameters import GrowParameters
-from rail_extract.core.progress import Progress, Recording
 from rail_extract.core.run.loop import Runner
-from rail_extract.core.scratch import scratch_folder
 from rail_extract.core.standards import SEARCHED_CLASSES
+from rail_extract.laboratory.scenes.las import write_las
 from rail_extract.laboratory.scenes.raw_strips import GAUGE_M, SPACING_M, WIDTH_M, strip
 
 CORNER = np.array([500_003.0, 5_000_008.0, 100.0])
 TRACK = strip(24.0)
-TEN = Choice(10, reset=False)
+TEN = Content(10, reset=False)
 SEED = CORNER[:2] + TRACK.at(12.0, SPACING_M / 2)
 
 
 def save(path, xyz, codes=1):
-    header = laspy.LasHeader(point_format=6, version="1.4")
-    header.scales, header.offsets = [0.0005] * 3, CORNER
-    cloud = laspy.LasData(header)
-    cloud.x, cloud.y, cloud.z = (xyz + CORNER).T
-    cloud.classification = np.full(len(xyz), codes)
-    cloud.intensity = np.arange(len(xyz)) % 60_000
-    cloud.write(path)
-    return path
-
-
-class Messages(Recording):
-    """Keeps what is said."""
-
-    def __init__(self):
-        super().__init__(Progress())
-        self.infos = []
-
-    def info(self, text):
-        self.infos.append(text)
+    intensity = np.arange(len(xyz)) % 60_000
+    where = {"offsets": CORNER, "scales": 0.0005}
+    return write_las(path, xyz + CORNER, **where, classification=codes, intensity=intensity)
 
 
 def grow(tmp_path, paths, output, seeds, choice=TEN, **changes):
-    progress = Messages()
+    progress = Heard()
     planned = plan_output(paths, output, choice.class_code, progress)
     request = ask(paths, SEARCHED_CLASSES, None, None, progress)
     settings = GrowSettings(GAUGE_M, WIDTH_M, GrowParameters(**changes))
@@ -131,20 +115,3 @@ def test_places_of_a_line_outside_of_the_cloud_are_not_looked_at(tmp_path, monke
     assert result.figures.paired_m == pytest.approx(47.0, abs=2.5)
     assert len(looked_at) < 5
     assert not any("not on a rail" in text for text in progress.warnings)
-
-
-def test_only_rails_are_written_on_request(tmp_path):
-    source = save(tmp_path / "raw.las", TRACK.xyz)
-    result, _ = grow(tmp_path, [source], tmp_path / "new.las", [SEED], Choice(20, only_rails=True, reset=False))
-    cloud = laspy.read(result.file)
-    assert len(cloud.points) == result.figures.points
-    assert np.all(cloud.classification == 20)
-
-
-def test_seeds_elsewhere_are_refused(tmp_path):
-    source = save(tmp_path / "raw.las", TRACK.xyz)
-    with pytest.raises(ParameterError, match="No seed is in the cloud"):
-        grow(tmp_path, [source], tmp_path / "new.las", [[12.0, 50.0]])
-    with pytest.raises(RailExtractError, match=r"No seed is on a rail: put seeds within 0\.25 m"):
-        grow(tmp_path, [source], tmp_path / "new.las", [CORNER[:2] + TRACK.at(12.0, 0.0)])
-    assert not (tmp_path / "new.las").exists()

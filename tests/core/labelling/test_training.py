@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 from rail_extract.core.classify.settings import Settings
-from rail_extract.core.clouds.las import laspy
 from rail_extract.core.clouds.points import ask
 from rail_extract.core.progress import Progress, Recording
 from rail_extract.core.standards import SEARCHED_CLASSES
+from rail_extract.laboratory.scenes.las import write_las
 from rail_extract.laboratory.scenes.raw_shapes import flat, rough, with_track
 
 pytest.importorskip("torch")
@@ -18,12 +18,8 @@ from rail_extract.core.labelling.training import Plan, _examples  # noqa: E402
 def test_damaged_blocks_are_cut_again(tmp_path, is_damaged):
     rng = np.random.RandomState(3)
     xyz, on = with_track(flat(12.0, rng=rng, per_m2=100), 1.435, 0.072, 0.3)
-    cloud = laspy.LasData(laspy.LasHeader(version="1.4", point_format=6))
-    cloud.header.scales = [0.001] * 3
-    cloud.x, cloud.y, cloud.z = rough(xyz, rng).T
-    cloud.classification = np.where(on, 10, 2)
-    cloud.write(tmp_path / "labelled.las")
-    request = ask([tmp_path / "labelled.las"], SEARCHED_CLASSES)
+    path = write_las(tmp_path / "labelled.las", rough(xyz, rng), classification=np.where(on, 10, 2))
+    request = ask([path], SEARCHED_CLASSES)
     progress = Recording(Progress())
     values = request, Settings((1.435,), 0.072), Plan((10,), 1, 0, "CPU"), tmp_path / "rails_training", progress
     first = _examples(*values)

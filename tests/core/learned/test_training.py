@@ -2,16 +2,16 @@
 
 import numpy as np
 import pytest
+from heard import Heard
 from rail_extract.core.errors import Cancelled, ModelError, ParameterError
-from rail_extract.core.learned.examples import Examples, save_index, write_square
-from rail_extract.core.progress import Progress
+from rail_extract.core.learned.blocks import Examples, save_index, write_square
 from rail_extract.laboratory.scenes.raw_shapes import track_beside_kerb
 
 torch = pytest.importorskip("torch")
 
 from rail_extract.core.learned import training  # noqa: E402
 from rail_extract.core.learned.model import save  # noqa: E402
-from rail_extract.core.learned.training import Figures, Settings, train  # noqa: E402
+from rail_extract.core.learned.training import LabelFigures, TrainingSettings, train  # noqa: E402
 
 SIDE = 40.0
 
@@ -27,17 +27,6 @@ def examples(tmp_path_factory):
     tile = (xyz[:, 0] > 20).astype(int)
     save_index(folder, write_square(folder, 0, (0, 0), SIDE, xyz, on, tile))
     return Examples.load(folder)
-
-
-class CancelledAfter(Progress):
-    """Cancels once a number of steps are done."""
-
-    def __init__(self, steps):
-        self.left = steps
-
-    def is_cancelled(self):
-        self.left -= 1
-        return self.left < 0
 
 
 def test_blocks_on_disk_have_their_labels_and_count_all_points(examples):
@@ -80,25 +69,25 @@ def test_an_interrupted_training_gives_the_same_weights(examples, tmp_path):
     once, twice = tmp_path / "once", tmp_path / "twice"
     once.mkdir()
     twice.mkdir()
-    whole = train(examples, Settings(1), once, "CPU")
+    whole = train(examples, TrainingSettings(1), once, "CPU")
     with pytest.raises(Cancelled, match=r"Cancelled at step 2 of \d: the same run continues from .*twice"):
-        train(examples, Settings(1), twice, "CPU", CancelledAfter(2))
+        train(examples, TrainingSettings(1), twice, "CPU", Heard(cancel_after=2))
     assert (twice / training.CHECKPOINT).exists()
-    resumed = train(examples, Settings(1), twice, "CPU")
+    resumed = train(examples, TrainingSettings(1), twice, "CPU")
     for name, value in whole.network.state_dict().items():
         assert torch.equal(value, resumed.network.state_dict()[name]), name
     assert resumed.checks == whole.checks
     assert resumed.by_tile == whole.by_tile
     with pytest.raises(ParameterError, match="twice holds another training"):
-        train(examples, Settings(2), twice, "CPU")
+        train(examples, TrainingSettings(2), twice, "CPU")
     (twice / training.CHECKPOINT).write_bytes(b"cut")
     with pytest.raises(ParameterError, match=r"checkpoint.pt is damaged: delete the folder .*twice and train again"):
-        train(examples, Settings(1), twice, "CPU")
+        train(examples, TrainingSettings(1), twice, "CPU")
 
 
 def test_a_full_graphics_card_is_said_in_a_sentence_and_the_checkpoint_stays(examples, tmp_path, monkeypatch):
     with pytest.raises(Cancelled):
-        train(examples, Settings(1), tmp_path, "CPU", CancelledAfter(1))
+        train(examples, TrainingSettings(1), tmp_path, "CPU", Heard(cancel_after=1))
     kept = (tmp_path / training.CHECKPOINT).read_bytes()
 
     def full(self, features, layers):
@@ -106,7 +95,7 @@ def test_a_full_graphics_card_is_said_in_a_sentence_and_the_checkpoint_stays(exa
 
     monkeypatch.setattr(training.RandLaNet, "forward", full)
     with pytest.raises(ModelError, match=r"too little free memory for 2 blocks at once: close .* continues from"):
-        train(examples, Settings(1), tmp_path, "CPU")
+        train(examples, TrainingSettings(1), tmp_path, "CPU")
     assert (tmp_path / training.CHECKPOINT).read_bytes() == kept
 
 
@@ -114,28 +103,28 @@ def test_a_training_starts_from_weights(examples, tmp_path):
     first, second = tmp_path / "first", tmp_path / "second"
     first.mkdir()
     second.mkdir()
-    learned = train(examples, Settings(1, seed=1), first, "CPU")
+    learned = train(examples, TrainingSettings(1, seed=1), first, "CPU")
     save(tmp_path / "first.npz", learned.network)
-    begun = train(examples, Settings(1, start=tmp_path / "first.npz"), second, "CPU")
+    begun = train(examples, TrainingSettings(1, start=tmp_path / "first.npz"), second, "CPU")
     weights = [torch.nn.utils.parameters_to_vector(one.network.parameters()) for one in (learned, begun)]
     moved = (weights[1] - weights[0]).norm() / weights[0].norm()
     assert 1e-4 < moved < 0.1
     with pytest.raises(ParameterError, match="second holds another training"):
-        train(examples, Settings(1), second, "CPU")
+        train(examples, TrainingSettings(1), second, "CPU")
 
 
 def test_the_loss_falls_and_the_output_is_calibrated(examples, tmp_path):
-    trained = train(examples, Settings(6), tmp_path, "CPU")
+    trained = train(examples, TrainingSettings(6), tmp_path, "CPU")
     losses = [check.loss for check in trained.checks]
     half = len(losses) // 2
     assert np.mean(losses[half:]) < 0.9 * np.mean(losses[:half])
     assert trained.total.f1 > 0.9
-    run = training._Run(examples, Settings(6), *_parts(examples), tmp_path, "cpu")
+    run = training._Run(examples, TrainingSettings(6), *_parts(examples), tmp_path, "cpu")
     run.resume()
     run.network.head[-1].bias.data += 3.0  # everything seems to be rail
-    f1 = sum(run.evaluated_by_tile().values(), Figures()).f1
+    f1 = sum(run.evaluated_by_tile().values(), LabelFigures()).f1
     run.calibrate()
-    assert sum(run.evaluated_by_tile().values(), Figures()).f1 >= f1
+    assert sum(run.evaluated_by_tile().values(), LabelFigures()).f1 >= f1
     best = run.network.head[-1].bias.item()
     run.calibrate()  # nothing is left to change
     assert run.network.head[-1].bias.item() == pytest.approx(best, abs=training.LOGIT_STEP + 1e-6)

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from heard import Heard
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rail_extract.core.lines.finishing import (
@@ -16,7 +17,6 @@ from rail_extract.core.lines.finishing import (
 )
 from rail_extract.core.parameters import Parameters
 from rail_extract.core.polyline import interpolate, length_along
-from rail_extract.core.progress import Progress
 from rail_extract.core.rails import RailLine, Support
 from rail_extract.core.raster import rasterize
 from rail_extract.core.squares.steps import lines_of
@@ -97,14 +97,6 @@ def test_stairs_of_a_line_that_is_hardly_smoothed_are_no_turn():
     stairs = np.column_stack([x, np.round(0.1 * x / 0.02) * 0.02])
     assert len(parts_without_turns(stairs, 1.0, 0.5)) == 1
     assert len(parts_without_turns(stairs, 1.0, 0.1)) != 1
-
-
-class Heard(Progress):
-    def __init__(self):
-        self.warnings = []
-
-    def warning(self, text):
-        self.warnings.append(text)
 
 
 @pytest.mark.parametrize("gaps", [[[3.0, 5.0], [28.0, 29.0]]])

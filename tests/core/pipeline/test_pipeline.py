@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from heard import Heard
 from rail_extract.core import pipeline
 from rail_extract.core.checks.lines import warn_of_split_classes
 from rail_extract.core.clouds.points import RailPoints
@@ -12,7 +13,6 @@ from rail_extract.core.errors import Cancelled, NoTrackError, ParameterError
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.pipeline import Parameters, extract_files, extract_rails
 from rail_extract.core.polyline import length_along, project
-from rail_extract.core.progress import Progress
 from rail_extract.core.rails import RailLine, SearchFigures
 from rail_extract.core.raster import cell_size, rasterize
 from rail_extract.core.run.loop import Runner
@@ -29,14 +29,6 @@ from rail_extract.laboratory.scenes.tracks import Track
 
 WIDTH = 0.072
 CURVES = [trace([Element(40.0)], heading=0.4), trace(transition_curve(15, 20, 15, 1 / 300), heading=-0.6)]
-
-
-class Warnings(Progress):
-    def __init__(self):
-        self.said = []
-
-    def warning(self, text):
-        self.said.append(text)
 
 
 def rails_at(curve, *lefts):
@@ -90,10 +82,10 @@ def test_a_gauge_without_track_is_an_error_only_if_no_gauge_has_one():
 def test_a_class_without_track_is_a_warning_if_another_class_has_one():
     fits, other = rails_at(CURVES[0], 0.0, 1.435 + WIDTH), rails_at(CURVES[0], 5.0, 6.0 + WIDTH)
     other = [replace(rail, class_code=11) for rail in other]
-    heard = Warnings()
+    heard = Heard()
     (track,) = tracks_of([*other, *fits], Parameters(1.435, WIDTH), heard)
     assert (track.track_id, track.class_code) == (1, 10)
-    (said,) = heard.said
+    (said,) = heard.warnings
     assert said.startswith("Class 11: No track of 1435 mm gauge found")
 
 
@@ -115,22 +107,22 @@ def split_between_classes(by_rail):
 
 @pytest.mark.parametrize("by_rail", [True, False])
 def test_a_track_that_is_split_between_classes_is_a_warning(by_rail):
-    heard = Warnings()
+    heard = Heard()
     warn_of_split_classes(split_between_classes(by_rail), Parameters(1.435, WIDTH), heard)
-    (said,) = heard.said
+    (said,) = heard.warnings
     assert said.startswith(SPLIT)
     assert said.endswith("set MERGE_CLASSES.")
 
 
 def test_tracks_of_two_classes_are_not_a_warning():
-    heard = Warnings()
+    heard = Heard()
     rails = rails_at(CURVES[0], 0.0, 1.435 + WIDTH, 5.0, 5.0 + 1.435 + WIDTH)
     rails = [
         replace(rail, class_code=10 + number // 2, rail_id=number, track_ids=(1 + number // 2,))
         for number, rail in enumerate(rails)
     ]
     warn_of_split_classes(rails, Parameters(1.435, WIDTH), heard)
-    assert heard.said == []
+    assert heard.warnings == []
 
 
 def test_lines_without_points_stay_in_their_cells_and_have_no_heights():
@@ -299,12 +291,8 @@ def _by_length(lines):
 
 
 def test_a_run_in_squares_can_be_cancelled():
-    class Stopped(Progress):
-        def is_cancelled(self):
-            return True
-
     with pytest.raises(Cancelled):
-        extract_rails([straight().rail_points()], Parameters(1.435, WIDTH, square_tiles=4), Stopped())
+        extract_rails([straight().rail_points()], Parameters(1.435, WIDTH, square_tiles=4), Heard(cancel_after=0))
 
 
 def test_squares_smaller_than_their_overlap_are_refused():
@@ -312,29 +300,21 @@ def test_squares_smaller_than_their_overlap_are_refused():
         extract_rails([straight().rail_points()], Parameters(1.435, WIDTH, square_tiles=2))
 
 
-class Listener(Progress):
-    def __init__(self):
-        self.fractions = [0.0]
-
-    def set_fraction(self, fraction):
-        self.fractions.append(fraction)
-
-
 def test_the_progress_rises_to_the_end_and_cleaning_has_its_share_of_it(monkeypatch):
     """Until the tracks are paired, at nine tenths, squares of equal points have equal shares."""
-    cleaning, listener = [], Listener()
+    cleaning, heard = [], Heard()
 
     def clean(raster, engine, passes, progress):
-        start = listener.fractions[-1]
+        start = heard.fractions[-1] if heard.fractions else 0.0
         progress.set_fraction(1.0)
-        cleaning.append(listener.fractions[-1] - start)
+        cleaning.append(heard.fractions[-1] - start)
         return raster
 
     monkeypatch.setattr(steps, "clean", clean)
     settings = Parameters(1.435, STANDARDS["EN_60E1_1435"].head_width_m, square_tiles=4, quality_step_m=1.0)
-    extract_rails([straight().rail_points()], settings, listener)
+    extract_rails([straight().rail_points()], settings, heard)
     assert len(cleaning) > 2
     share = pipeline.CLEAN_S / (pipeline.CLEAN_S + pipeline.DRAW_S)
     assert sum(cleaning) == pytest.approx(share * 0.9, abs=1e-9)
-    assert (np.diff(listener.fractions) >= -1e-12).all()
-    assert min(listener.fractions) >= 0.0 and listener.fractions[-1] == max(listener.fractions) == 1.0
+    assert (np.diff(heard.fractions) >= -1e-12).all()
+    assert min(heard.fractions) >= 0.0 and heard.fractions[-1] == max(heard.fractions) == 1.0

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from rail_extract.core.clouds.las import laspy
 from rail_extract.core.clouds.points import ask
 from rail_extract.core.errors import NoRailPointsError, RailExtractError
 from rail_extract.core.parameters import Parameters
@@ -10,6 +9,7 @@ from rail_extract.core.pipeline.sources import Raw
 from rail_extract.core.progress import SILENT
 from rail_extract.core.run.loop import Answer, InTurn, Runner
 from rail_extract.core.standards import SEARCHED_CLASSES
+from rail_extract.laboratory.scenes.las import write_las
 
 PARAMETERS = Parameters(1.435, 0.072)
 
@@ -31,11 +31,8 @@ class Failing(InTurn):
     ],
 )
 def test_a_cloud_that_could_not_be_searched_is_not_called_empty(tmp_path, executor, kind, words):
-    cloud = laspy.LasData(laspy.LasHeader(point_format=6, version="1.4"))
-    rng = np.random.RandomState(1)
-    cloud.x, cloud.y, cloud.z = rng.uniform(0, 5, (3, 2000)) * [[1], [1], [0.01]]
-    cloud.write(tmp_path / "raw.las")
-    request = ask([tmp_path / "raw.las"], SEARCHED_CLASSES, None, None, SILENT)
+    ground = np.random.RandomState(1).uniform(0, 5, (2000, 3)) * [1, 1, 0.01]
+    request = ask([write_las(tmp_path / "raw.las", ground)], SEARCHED_CLASSES, None, None, SILENT)
     runner = Runner(executor(), tolerant=True)
     with pytest.raises(kind, match=words) as error, Raw(request).sort(tmp_path, PARAMETERS, runner, SILENT):
         pass

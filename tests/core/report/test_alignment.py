@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rail_extract.core.alignment.deviations import Deviations
 from rail_extract.core.alignment.elements import Alignment, CantElement, Figures, VerticalElement, chained
+from rail_extract.core.alignment.measured import Deviations
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.report import build_alignment_page
 from rail_extract.core.report.alignment import draw_alignment, measured_curvature, measured_grade

@@ -1,7 +1,6 @@
 """Extraction on real workers: the lines of one process, even if workers die, disks are full or versions differ."""
 
 import os
-import resource
 import signal
 import threading
 import time
@@ -9,21 +8,20 @@ import time
 import numpy as np
 import pytest
 from distributed import Client, KilledWorker, LocalCluster
+from heard import Heard
 from rail_extract.core.clouds.points import ask, read_rail_points
-from rail_extract.core.errors import DiskError
 from rail_extract.core.pipeline import Parameters, extract_files, extract_rails
 from rail_extract.core.pipeline.sources import Classified
-from rail_extract.core.progress import SILENT, Progress
+from rail_extract.core.progress import SILENT
 from rail_extract.core.rails import RailLine
 from rail_extract.core.run.cluster import Cluster, execute
 from rail_extract.core.run.loop import InTurn, Runner
-from rail_extract.core.run.tasks import Task
-from rail_extract.core.run.version import version
+from rail_extract.core.run.tasks import Task, version
 from rail_extract.core.squares.kept import KeptResults
 from rail_extract.core.squares.steps import square_side
 from rail_extract.core.standards import STANDARDS
 from rail_extract.core.tiles.grid import lay_out
-from rail_extract.core.tiles.spool import spool
+from rail_extract.core.tiles.store import spool
 from rail_extract.laboratory.scenes.scene import RAIL
 
 STANDARD = STANDARDS["EN_60E1_1435"]
@@ -155,16 +153,6 @@ def square_keys(tiles, folder):
     return [square.key for square in lay_out([source], source)]
 
 
-class Heard(Progress):
-    """Keeps warnings."""
-
-    def __init__(self):
-        self.texts = []
-
-    def warning(self, text):
-        self.texts.append(text)
-
-
 def test_damaged_results_are_computed_again_with_a_warning(tiles, one_process, executor, tmp_path):
     extract(executor, [tiles], tmp_path)
     sizes = {file: file.stat().st_size for file in tmp_path.glob("*.npz")}
@@ -178,20 +166,12 @@ def test_damaged_results_are_computed_again_with_a_warning(tiles, one_process, e
         found = extract(executor, [tiles], tmp_path, heard)
         assert found.failures == ()
         same(found.rails, one_process.rails, found.frame, one_process.frame)
-    assert len(heard.texts) == 3  # all from the first restart
-    assert len([text for text in heard.texts if "the stored result is damaged, so it is computed again" in text]) == 2
-    assert len([text for text in heard.texts if text.startswith("The stored points of tile")]) == 1
+    assert len(heard.warnings) == 3  # all from the first restart
+    assert (
+        len([text for text in heard.warnings if "the stored result is damaged, so it is computed again" in text]) == 2
+    )
+    assert len([text for text in heard.warnings if text.startswith("The stored points of tile")]) == 1
     assert {file: file.stat().st_size for file in tmp_path.glob("*.npz")} == sizes
-
-
-def test_a_full_work_folder_is_one_sentence(tiles, tmp_path):
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, hard))
-    try:
-        with pytest.raises(DiskError, match="free space"):
-            spool(ask(tiles, [RAIL]), square_side(PARAMETERS), tmp_path)
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
 def first_of(name, context):

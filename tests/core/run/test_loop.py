@@ -3,29 +3,15 @@
 import weakref
 
 import pytest
+from heard import Heard
 from hypothesis import given
 from hypothesis import strategies as st
 from rail_extract.core.errors import Cancelled
-from rail_extract.core.progress import Progress
 from rail_extract.core.run.loop import Runner
 from rail_extract.core.run.tasks import Once, Task
 from rail_extract.core.tiles.grid import around
 
 keys = st.sets(st.tuples(st.integers(-3, 3), st.integers(-3, 3)), min_size=1)
-
-
-class Listener(Progress):
-    def __init__(self, cancel_at=2.0):
-        self.fractions, self.texts, self.cancel_at = [], [], cancel_at
-
-    def status(self, text):
-        self.texts.append(text)
-
-    def set_fraction(self, fraction):
-        self.fractions.append(fraction)
-
-    def is_cancelled(self):
-        return bool(self.fractions) and self.fractions[-1] >= self.cancel_at
 
 
 class Raster:
@@ -78,17 +64,17 @@ def test_the_progress_follows_the_weights():
     def half(key, context):
         context.progress.set_fraction(0.5)
 
-    listener = Listener()
+    heard = Heard()
     tasks = {number: Task("", half, (number,), weight=weight) for number, weight in enumerate((1, 6, 3))}
-    list(Runner().run(tasks, listener))
-    assert listener.fractions == pytest.approx([0.05, 0.1, 0.4, 0.7, 0.85, 1.0])
+    list(Runner().run(tasks, heard))
+    assert heard.fractions == pytest.approx([0.05, 0.1, 0.4, 0.7, 0.85, 1.0])
 
 
 def test_a_cancel_is_noticed_between_tasks():
     ran = []
     tasks = {number: Task("", lambda one, context: ran.append(one), (number,)) for number in range(4)}
     with pytest.raises(Cancelled):
-        list(Runner().run(tasks, Listener(cancel_at=0.5)))
+        list(Runner().run(tasks, Heard(cancel_at=0.5)))
     assert ran == [0, 1]
 
 
@@ -108,8 +94,8 @@ def test_the_start_of_a_network_is_said_once():
     def clean(key, context):
         return context.network(len, key)
 
-    listener = Listener()
+    heard = Heard()
     tasks = {key: Task("", clean, (key,)) for key in ("aa", "bbb")}
     tasks["again"] = Task("", clean, ("bbb",))
-    assert dict(Runner().run(tasks, listener)) == {"aa": 2, "bbb": 3, "again": 3}
-    assert listener.texts == 2 * ["Starting the network", "The network has started"]
+    assert dict(Runner().run(tasks, heard)) == {"aa": 2, "bbb": 3, "again": 3}
+    assert heard.texts("status") == 2 * ["Starting the network", "The network has started"]

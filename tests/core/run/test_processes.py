@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from heard import Heard
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from rail_extract.core.clouds.points import ask
@@ -16,7 +17,6 @@ from rail_extract.core.errors import Cancelled, RailExtractError
 from rail_extract.core.kernels import blas, one_thread
 from rail_extract.core.pipeline import Parameters, extract_files
 from rail_extract.core.pipeline.sources import Classified
-from rail_extract.core.progress import Progress
 from rail_extract.core.run import processes as module
 from rail_extract.core.run.loop import Runner
 from rail_extract.core.run.processes import Processes, worker_count, workers
@@ -82,26 +82,6 @@ def half(context):
 """
 
 
-class Log(Progress):
-    def __init__(self, cancel_at=2.0):
-        self.said, self.fractions, self.cancel_at = [], [], cancel_at
-
-    def set_fraction(self, fraction):
-        self.fractions.append(fraction)
-
-    def status(self, text):
-        self.said.append(("status", text))
-
-    def info(self, text):
-        self.said.append(("info", text))
-
-    def warning(self, text):
-        self.said.append(("warning", text))
-
-    def is_cancelled(self):
-        return bool(self.fractions) and self.fractions[-1] >= self.cancel_at
-
-
 @pytest.fixture(scope="module")
 def functions(tmp_path_factory):
     """A module of tasks that other processes find."""
@@ -130,11 +110,11 @@ def two(executor):
     return Runner(executor)
 
 
-def run(runner, tasks, log=None):
+def run(runner, tasks, heard=None):
     """Return results in their order, and the error that ended the run, if one did."""
     found = []
     try:
-        for one in runner.run(tasks, log or Log()):
+        for one in runner.run(tasks, heard or Heard()):
             found.append(one)
     except RailExtractError as error:
         return found, str(error)
@@ -172,7 +152,7 @@ def test_results_messages_and_errors_come_as_from_one_process(functions, executo
     }
     for number in failing & set(tasks):
         tasks[number] = replace(tasks[number], function=functions.fail, arguments=(number, 0.0))
-    expected, found = Log(), Log()
+    expected, found = Heard(), Heard()
     alone, two = Runner(tolerant=tolerant), Runner(executor, tolerant=tolerant)
     assert run(two, tasks, found) == run(alone, tasks, expected)
     assert [one for one in found.said if "WORKERS" not in one[1]] == expected.said
@@ -188,9 +168,9 @@ def test_the_first_error_counts_even_if_a_later_one_comes_sooner(functions, two,
         3: Task("", functions.fail, (3, 0.0)),
         4: Task("", functions.leave, (str(late),)),
     }
-    log = Log()
-    assert run(two, tasks, log) == ([(1, 1)], "task 2")
-    assert ("warning", "before 3") not in log.said
+    heard = Heard()
+    assert run(two, tasks, heard) == ([(1, 1)], "task 2")
+    assert ("warning", "before 3") not in heard.said
     assert not late.exists()
 
 
@@ -223,19 +203,19 @@ def test_modules_of_the_current_folder_are_not_taken(functions, monkeypatch, tmp
 
 
 def test_the_progress_rises_to_the_end(functions, two):
-    log = Log()
-    list(two.run({number: Task("", functions.half, (), weight=1 + number) for number in range(4)}, log))
-    assert log.fractions == sorted(log.fractions)
-    assert log.fractions[-1] == pytest.approx(1.0)
-    assert len(log.fractions) == 8
-    assert ("status", "half") in log.said
+    heard = Heard()
+    list(two.run({number: Task("", functions.half, (), weight=1 + number) for number in range(4)}, heard))
+    assert heard.fractions == sorted(heard.fractions)
+    assert heard.fractions[-1] == pytest.approx(1.0)
+    assert len(heard.fractions) == 8
+    assert ("status", "half") in heard.said
 
 
 def test_a_cancel_ends_the_processes(functions, tmp_path):
-    log = Log(cancel_at=0.01)
+    heard = Heard(cancel_at=0.01)
     with workers(2) as runner:
         with pytest.raises(Cancelled):
-            list(runner.run({number: Task("", functions.slow, (str(tmp_path),)) for number in range(4)}, log))
+            list(runner.run({number: Task("", functions.slow, (str(tmp_path),)) for number in range(4)}, heard))
         started = [int(file.name) for file in tmp_path.iterdir()]
         assert started
         assert not any(map(is_alive, started))
@@ -255,9 +235,9 @@ def test_a_task_whose_worker_ends_runs_again(functions, two, tmp_path):
         number: Task(f"task {number}", functions.die_first, (str(tmp_path / f"{number}"), number))
         for number in range(3)
     }
-    log = Log()
-    assert run(two, tasks, log) == ([(0, 1), (1, 2), (2, 3)], None)
-    assert len([text for _, text in log.said if text.startswith("A worker process ended")]) == 3
+    heard = Heard()
+    assert run(two, tasks, heard) == ([(0, 1), (1, 2), (2, 3)], None)
+    assert len([text for _, text in heard.said if text.startswith("A worker process ended")]) == 3
 
 
 def test_a_worker_that_ends_while_it_waits_is_replaced(functions, executor):
@@ -339,12 +319,12 @@ def ends_at_once():
 
 @pytest.mark.parametrize("interpreter", [refuse, missing, ends_at_once])
 def test_without_workers_this_process_does_the_work_and_says_why(functions, interpreter):
-    log = Log()
+    heard = Heard()
     with workers(2, interpreter) as runner:
         for _ in range(2):
-            found, _ = run(runner, {number: Task("", functions.add, (number,)) for number in range(2)}, log)
+            found, _ = run(runner, {number: Task("", functions.add, (number,)) for number in range(2)}, heard)
             assert found == [(0, 0), (1, 1)]
-    reasons = [text for _, text in log.said if text.startswith("One process works alone")]
+    reasons = [text for _, text in heard.said if text.startswith("One process works alone")]
     assert len(reasons) == 1
 
 

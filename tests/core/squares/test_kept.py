@@ -10,9 +10,9 @@ from rail_extract.core.parameters import Parameters
 from rail_extract.core.rails import RailLine, Support
 from rail_extract.core.raster import rasterize
 from rail_extract.core.squares.kept import DamagedError, Stored, can_store, fingerprint, load, save
-from rail_extract.core.squares.pieces import SquareRails
+from rail_extract.core.squares.seams import SquareRails
 from rail_extract.core.tiles.grid import Square
-from rail_extract.core.tiles.spool import SpooledPoints
+from rail_extract.core.tiles.store import SpooledPoints
 
 FRAME = LocalFrame(np.array([500.0, 7100.0, 0.0]), 0.3048, 1.0, "EPSG:2227")
 XYZ = np.random.RandomState(2).uniform(-30, 30, (40, 3))

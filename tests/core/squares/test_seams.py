@@ -7,8 +7,7 @@ from hypothesis import strategies as st
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.polyline import length_along, project
 from rail_extract.core.rails import RailLine, Support
-from rail_extract.core.squares.pieces import trim
-from rail_extract.core.squares.seams import join
+from rail_extract.core.squares.seams import join, trim
 from rail_extract.core.tiles.grid import HALO_M, Square, Tiling
 
 SIDE, REACH = 40.0, 20.0

@@ -4,10 +4,10 @@ from functools import cache
 
 import numpy as np
 import pytest
+from heard import Heard
 from rail_extract.core.errors import Cancelled
 from rail_extract.core.lines.smoothing import smooth_network
 from rail_extract.core.polyline import length_along
-from rail_extract.core.progress import Progress
 from rail_extract.core.raster import RailRaster
 from rail_extract.core.vectorize import vectorize
 from rail_extract.laboratory.curves import Element, trace
@@ -255,12 +255,8 @@ def test_short_pieces_are_dropped():
 
 
 def test_a_cancel_ends_the_work():
-    class Impatient(Progress):
-        def is_cancelled(self):
-            return True
-
     with pytest.raises(Cancelled):
-        vectorize(draw([straight(5, 0.3)]), HEAD_M, progress=Impatient())
+        vectorize(draw([straight(5, 0.3)]), HEAD_M, progress=Heard(cancel_after=0))
 
 
 def test_a_weed_on_the_side_of_a_rail_is_not_a_branch():

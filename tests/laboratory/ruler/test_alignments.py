@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 from rail_extract.core.alignment.elements import Alignment, chained
-from rail_extract.core.alignment.held import given_of, noted
-from rail_extract.core.alignment.plane_fit import Points, fit_plan
+from rail_extract.core.alignment.layouts import given_of, noted
+from rail_extract.core.alignment.plane_fit import MeasuredLine, fit_plan
 from rail_extract.core.frame import LocalFrame
 from rail_extract.laboratory.designs import surveyed
 from rail_extract.laboratory.ruler.alignments import bound_of, quantiles
@@ -22,7 +22,7 @@ def test_errors_of_fits_with_the_true_types_are_as_large_as_the_bound():
     given, starts, radii = given_of(design, 0.0, float(s[-1])), [], []
     for seed in range(40):
         line = surveyed(design, np.random.default_rng(seed), WHITE_M)
-        points = Points(line[:, :2], s, np.full(len(s), WHITE_M**-2))
+        points = MeasuredLine(line[:, :2], s, np.full(len(s), WHITE_M**-2))
         found = fit_plan(given.chain, points, given.held, poses=given.poses).elements
         starts.append([one.s_from for one in found[1:]])
         radii.append(1 / found[2].k_from)

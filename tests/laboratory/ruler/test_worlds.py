@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rail_extract.core.comparison.pieces import cut
+from rail_extract.core.comparison.measures import cut
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.rails import Centerline, RailLine, RailNetwork, Support, TrackGeometry
 from rail_extract.laboratory.ruler.rates import bounds, mcnemar, summary

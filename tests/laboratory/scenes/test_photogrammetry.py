@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from rail_extract.core.standards import STANDARDS
 from rail_extract.laboratory.scenes.raw import scan_world
-from rail_extract.laboratory.scenes.raw_catalogue import line, parallel
+from rail_extract.laboratory.scenes.raw_catalogue import line, parallel, turnout
 from rail_extract.laboratory.scenes.raw_photogrammetry import (
     Photogrammetry,
     misplaced,
@@ -49,6 +49,14 @@ def test_a_rail_becomes_a_ridge_of_the_width_and_height_of_a_blunted_bar():
     assert np.mean(scene.shown[0][:, 2] - rail[:, 2]) == pytest.approx(section[0], abs=0.003)
     assert np.mean(scene.shown[0][:, 2] - rail[:, 2]) < -0.02
     assert off[scene.kind == HEAD].min() < 0.01
+
+
+def test_rails_of_a_switch_are_as_far_below_their_tops_as_the_other_track():
+    """Sampled beside a branch, its crest lay on the flank; where two rails meet, one ridge of both lifted it."""
+    scene = turnout(5, scanner=Photogrammetry(wave_m=0.0, drift_m=0.0))
+    lowered_m = [np.percentile(rail[:, 2] - shown[:, 2], [10, 50, 90]) for rail, shown in zip(scene.rails, scene.shown)]
+    assert np.ptp([median for _, median, _ in lowered_m]) < 0.003
+    assert max(most - least for least, _, most in lowered_m) < 0.006
 
 
 def test_two_epochs_share_the_place_and_have_errors_of_their_own():

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from memory_layers import layer_of
-from osgeo import ogr
 from qgis.core import QgsFeature, QgsProcessingUtils, QgsVectorLayer, QgsWkbTypes
 from rail_extract.core.alignment.elements import Alignment, CantElement, VerticalElement, chained
 from rail_extract.core.fields import ELEMENT_FIELDS
@@ -64,23 +63,6 @@ def imported(run_step, context):
     return read
 
 
-def test_a_table_becomes_landxml_and_a_table_again(exported, imported):
-    outcome, path = exported("Süd strecke.xml", table(design(), design(5)))
-    assert outcome.ok, outcome.error
-    assert (outcome.results["ALIGNMENT_COUNT"], outcome.results["ELEMENT_COUNT"]) == (2, 20)
-    results, elements, axes = imported(path)
-    assert elements.crs().authid() == axes.crs().authid() == "EPSG:25832"
-    assert (results["ALIGNMENT_COUNT"], results["ELEMENT_COUNT"]) == (2, 22)
-    found = [one for one in elements.getFeatures() if one["track_id"] == 5]
-    plan = [one for one in found if one["layout"] == "H"]
-    assert [one["type"] for one in plan] == ["line", "clothoid", "arc", "clothoid", "clothoid", "arc"]
-    assert [one["r1_m"] for one in plan][2] == 500 and plan[-1]["r2_m"] == -400
-    assert [one["cant2_mm"] for one in found if one["layout"] == "C"] == [0, -100, -100]
-    (line, *_) = plan
-    assert (line["x"], line["y"]) == (578_210, 5_804_400)
-    assert line.geometry().length() == pytest.approx(100.0, abs=1e-3)
-
-
 @pytest.mark.parametrize(
     ("name", "lost"), [("a.xml", "standard errors"), ("a.ifc", "standard errors"), ("a.dxf", "the coordinate system")]
 )
@@ -133,18 +115,3 @@ def test_the_cant_of_tracks_is_compared_with_that_of_the_design(exported, run_st
     assert off == pytest.approx([4.0] * len(off), abs=0.1) and len(off) == 309
     alone = run_step("importalignment", {"INPUT": path, "QUALITY": stations, "ELEMENTS": "memory:"})
     assert "QUALITY and RAILS state the cant of measured tracks: choose TRACKS." in alone.error
-
-
-def test_gdal_reads_the_dxf(exported):
-    outcome, path = exported("a.dxf")
-    assert outcome.ok, outcome.error
-    dataset = ogr.Open(str(path))
-    features = list(dataset.GetLayer(0))  # GDAL crashes if nothing refers to a feature
-    found = [(one["Layer"], one.GetGeometryRef().GetGeometryName(), one["Text"]) for one in features]
-    kinds = [(layer, kind, bool(text)) for layer, kind, text in found]
-    assert kinds.count(("ALIGNMENT_4", "LINESTRING", False)) == 1
-    assert kinds.count(("PLAN_4", "POINT", False)) == kinds.count(("PLAN_4", "POINT", True)) == 5
-    assert {text.strip() for _, _, text in found if text} >= {"line, L 100.00", "arc R 500.00, L 80.00"}
-    points = next(one for one in features if one["Layer"] == "ALIGNMENT_4").GetGeometryRef().GetPoints()
-    expected = FRAME.to_crs(design().xyz(np.array([0.0, 360.0])))
-    np.testing.assert_allclose([points[0], points[-1]], expected, atol=1e-3)

@@ -5,15 +5,7 @@ import re
 import laspy
 import numpy as np
 import pytest
-from memory_layers import layer_of
-from qgis.core import (
-    QgsCoordinateReferenceSystem,
-    QgsCoordinateTransform,
-    QgsGeometry,
-    QgsPointXY,
-    QgsProject,
-)
-from rail_extract.laboratory.scenes.raw_shapes import MIDDLE, flat, rough, with_track
+from rail_extract.laboratory.scenes.raw_shapes import flat, rough, with_track
 
 CORNER = np.array([500_000.0, 3_000_000.0, 100.0])
 
@@ -55,21 +47,6 @@ def test_only_rail_points_of_part_of_the_cloud_go_into_a_temporary_file(raw, run
     assert (cloud.classification == 20).all()
     assert 0 < len(cloud.points) == done.results["RAIL_POINTS"]
     assert cloud.y.max() <= north
-
-
-@pytest.mark.parametrize(("left_m", "found"), [(0.3, True), (1.2, False)])
-def test_a_guide_in_degrees_chooses_the_track(raw, run_step, tmp_path, left_m, found):
-    """The guide runs along the track, in another coordinate system than the cloud."""
-    along, across = np.array([np.cos(0.3), np.sin(0.3)]), np.array([-np.sin(0.3), np.cos(0.3)])
-    ends = CORNER[:2] + MIDDLE + left_m * across + np.outer([-50, 50], along)
-    utm, degrees = QgsCoordinateReferenceSystem("EPSG:32643"), QgsCoordinateReferenceSystem("EPSG:4326")
-    shape = QgsGeometry.fromPolylineXY([QgsPointXY(*end) for end in ends])
-    shape.transform(QgsCoordinateTransform(utm, degrees, QgsProject.instance()))
-    guide = layer_of(shape, kind="LineString", crs="EPSG:4326")
-    values = {"INPUT": raw[0], "GUIDE": guide, "ONLY_GUIDED": True, "OUTPUT": tmp_path / "new.laz"}
-    done = run_step("classifyrailpoints", values)
-    assert done.ok, done.error
-    assert done.results["PAIRED_LENGTH"] == pytest.approx(19 if found else 0, abs=2)
 
 
 def test_a_folder_of_tiles_gives_a_folder_of_tiles_with_a_catalogue(raw, run_step, tmp_path):

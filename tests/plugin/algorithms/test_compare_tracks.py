@@ -83,10 +83,3 @@ def test_centerlines_with_their_rails(compare):
     np.testing.assert_allclose(values["gauge_mm"].astype(float), 4.0, atol=0.1)
     np.testing.assert_allclose(values["cant_mm"].astype(float), 6.0, atol=0.1)
     np.testing.assert_allclose(values["sigma_mm"].astype(float), np.hypot(1, 2) / np.sqrt(2), atol=0.006)
-
-
-def test_lines_without_heights(compare):
-    results, values, _ = compare(layer([arc()], kind="LineString"), layer([arc(0.01)], kind="LineString"))
-    assert results["ACROSS_RMS"] == pytest.approx(10, abs=0.05)
-    assert results["HEIGHT_RMS"] is results["SHIFT_UP"] is None
-    assert set(values["height_mm"]) == {None}

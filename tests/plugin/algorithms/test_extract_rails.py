@@ -1,9 +1,7 @@
 import re
-import shutil
 import subprocess
 import sys
 from importlib.util import find_spec
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,14 +13,13 @@ from qgis.core import (
     QgsCoordinateTransform,
     QgsGeometry,
     QgsProcessingOutputLayerDefinition,
-    QgsProcessingUtils,
     QgsProject,
     QgsRectangle,
     QgsVectorLayer,
 )
+from rail_extract.core.disk import PREFIX
 from rail_extract.core.kernels import blas
 from rail_extract.core.run import processes
-from rail_extract.core.scratch import PREFIX
 
 POINTS = f"{PREFIX}*/*/10_*"
 """Files with temporary points of class 10."""
@@ -134,24 +131,6 @@ def test_a_mask_limits_the_points(run, scene, outputs, crs):
     assert outcome.results["RAIL_LENGTH"] == pytest.approx(12, abs=0.2)
 
 
-def test_an_axis_gives_the_track_geometry_kilometres(run, scene, tmp_path, new_feedback):
-    """The axis runs west, 5 m south of the track, with kilometres as M values."""
-    line = "LINESTRING M(500020 2999995 17.1, 499990 2999995 17.13)"
-    axis = layer_of(line, kind="LineStringM", fields="&field=ref:string(9)", values=[("4711",)])
-    page, feedback = tmp_path / "report.html", new_feedback()
-    outcome = run({**scene, "AXIS": axis, "QUALITY": tmp_path / "quality.gpkg", "REPORT": page}, feedback)
-    assert outcome.ok, outcome.error
-    assert feedback.warnings == []
-    _, stations = lines_of(tmp_path / "quality.gpkg")
-    assert len(stations) > 8
-    for station in stations:
-        east = station.geometry().constGet().x() - 500_000
-        assert station["km"] == pytest.approx(17.12 - east / 1000, abs=2e-6)
-        assert station["offset_m"] == pytest.approx(-5, abs=0.05)
-        assert (station["axis"], station["side"], station["piece"]) == ("4711", "right", 1)
-    assert f"<td>{stations[0]['km_text']} to {stations[-1]['km_text']}</td>" in page.read_text(encoding="utf-8")
-
-
 def test_rails_of_two_classes_make_a_track_when_merged(run, new_feedback, write_cloud, track, tmp_path):
     points = track()
     left = points[:, 1] > 3_000_000
@@ -213,68 +192,12 @@ def test_the_log_names_steps_figures_and_verdict(run, scene, new_feedback, tmp_p
         assert re.fullmatch(pattern, said), said
 
 
-def test_progress_advances_to_the_end(run, scene, new_feedback):
-    feedback = new_feedback()
-    assert run(scene, feedback).ok
-    assert feedback.progress == sorted(feedback.progress)
-    assert len(feedback.progress) > 10
-    assert feedback.progress[-1] == pytest.approx(100)
-
-
-def test_cancelled_run_writes_nothing_and_deletes_temporary_points(run, scene, outputs, new_feedback):
-    # The folder may be shared with other processes, which have their own temporary points there.
-    shared, feedback = Path(QgsProcessingUtils.tempFolder()).parent, new_feedback(cancel_at=25)
-    folders, others = set(), set(shared.glob(f"{PREFIX}*"))
-    feedback.progressChanged.connect(lambda _: folders.update(one.parent.parent for one in shared.glob(POINTS)))
-    outcome = run({**scene, **outputs}, feedback)
-    assert not outcome.ok
-    assert outcome.error == "Cancelled; nothing was written."
-    assert not any(path.exists() for path in outputs.values())
-    assert folders - others
-    assert not any(folder.exists() for folder in folders - others)
-
-
-def test_failed_run_keeps_the_old_output(run, outputs, write_cloud, track):
-    outputs["RAILS"].write_bytes(b"old")
-    outcome = run({"INPUT": write_cloud(track(), class_code=2), **outputs})
-    assert not outcome.ok
-    assert outputs["RAILS"].read_bytes() == b"old"
-
-
-def test_if_one_output_fails_the_others_are_complete(run, scene, outputs, tmp_path, new_feedback):
-    gone, feedback = tmp_path / "gone", new_feedback()
-    gone.mkdir()
-    feedback.progressChanged.connect(lambda done: shutil.rmtree(gone, ignore_errors=True))
-    more = {"CENTERLINES": gone / "tracks.gpkg", "QUALITY": tmp_path / "quality.gpkg", "REPORT": tmp_path / "r.html"}
-    outcome = run({**scene, **outputs, **more}, feedback)
-    assert not outcome.ok
-    assert outcome.error.endswith("Not written: CENTERLINES. Complete: RAILS, QUALITY, REPORT.")
-    assert len(lines_of(outputs["RAILS"])[1]) == 2
-    assert len(lines_of(more["QUALITY"])[1]) > 10
-    assert "Track 1" in more["REPORT"].read_text(encoding="utf-8")
-
-
-def test_another_gauge_is_reported_before_the_run(run, write_cloud, track, new_feedback):
-    feedback = new_feedback(cancel_at=0.1)
-    outcome = run({"INPUT": write_cloud(track(spacing_m=1.072)), "STANDARD": "EN_60E1_1435"}, feedback)
-    assert not outcome.ok
-    (warning,) = feedback.warnings
-    assert warning.startswith("Rails are 1072 mm apart, with heads 7")
-    assert "; 1507 mm apart are expected: is it EN 54E1 (UIC 54), 1000 mm (EN_54E1_1000)?" in warning
-
-
 def test_rail_standard_is_detected(run, write_cloud, track, new_feedback, tmp_path):
     feedback, rails = new_feedback(), tmp_path / "rails.gpkg"
     outcome = run({"INPUT": write_cloud(track()), "STANDARD": "DETECT", "ITERATIONS": 1, "RAILS": rails}, feedback)
     assert outcome.ok, outcome.error
     assert outcome.results["CENTERLINE_COUNT"] == 1
     assert "Detected EN 60E1 (UIC 60), 1435 mm (EN_60E1_1435): rails are 1507 mm apart" in feedback.said()
-
-
-def test_coordinate_system_can_be_set(run, outputs, write_cloud, track):
-    outcome = run({"INPUT": write_cloud(track(), epsg=None), "CRS": "EPSG:32643", "ITERATIONS": 1, **outputs})
-    assert outcome.ok, outcome.error
-    assert lines_of(outputs["RAILS"])[0].crs().authid() == "EPSG:32643"
 
 
 @pytest.mark.skipif(not blas(), reason="This numpy has a BLAS that knows one thread only.")

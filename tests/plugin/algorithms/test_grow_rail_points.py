@@ -68,11 +68,3 @@ def test_one_rail_grows_from_a_place_on_the_map(raw, run_step):
     assert len(cloud.points) == done.results["RAIL_POINTS"]
     assert np.abs(cloud.y - y).max() < 0.06
     assert done.results["SINGLE_LENGTH"] == pytest.approx(13.5, abs=1)
-
-
-def test_a_line_along_a_rail_is_a_row_of_seeds(raw, run_step, tmp_path):
-    line = QgsGeometry.fromPolylineXY([place(2.0, SPACING_M / 2), place(12.0, SPACING_M / 2)])
-    values = {"INPUT": raw, "SEEDS": layer_of(line, kind="LineString"), "MAX_LENGTH": 2, "OUTPUT": tmp_path / "n.las"}
-    done = run_step("growrailpoints", values)
-    assert done.ok, done.error
-    assert 12 < done.results["PAIRED_LENGTH"] < 22

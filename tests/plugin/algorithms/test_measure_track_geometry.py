@@ -73,25 +73,6 @@ def test_points_have_the_fields_of_the_interface_and_the_values_of_the_track(mea
     np.testing.assert_allclose([first.x(), first.y(), first.z()], middle[0], atol=1e-6)
 
 
-def test_feet_give_the_same_millimetres(measure):
-    lines = curved_track(unit_m=1200 / 3937)
-    _, layer, values = measure(layer_of(*lines[:1], crs="EPSG:2227"), layer_of(*lines[1:], crs="EPSG:2227"))
-    np.testing.assert_allclose(values["gauge_mm"], SPACING_MM - 72.0, atol=0.2)
-    np.testing.assert_allclose(values["cant_mm"], -CANT_MM, atol=0.01)
-    np.testing.assert_allclose(values["radius_m"], RADIUS_M, rtol=0.002)
-    assert layer.crs().authid() == "EPSG:2227"
-
-
-def test_step_and_head_width(measure):
-    middle, left, right = curved_track()
-    rails = layer_of(left, right)
-    _, _, values = measure(layer_of(middle), rails, STEP=2.5, HEAD_WIDTH=65)
-    np.testing.assert_allclose(np.diff(values["chainage_m"]), 2.5)
-    np.testing.assert_allclose(values["gauge_mm"], SPACING_MM - 65.0, atol=0.2)
-    _, _, values = measure(layer_of(middle), rails, STANDARD="IN_75R_1000")
-    np.testing.assert_allclose(values["gauge_mm"], SPACING_MM - 61.91, atol=0.2)
-
-
 def test_without_a_cloud_support_comes_from_the_fields_of_the_rails(measure):
     middle, left, right = curved_track()
     fields = "&field=rail_id:integer&field=class_code:integer&field=points:integer&field=sigma_mm:double"
@@ -103,21 +84,6 @@ def test_without_a_cloud_support_comes_from_the_fields_of_the_rails(measure):
     np.testing.assert_allclose(values["sigma_mm"], 2.5, rtol=1e-6)
     assert results["SIGMA"] == pytest.approx(2.5)
     np.testing.assert_allclose(values["points"][1:-1], 30, atol=1)
-
-
-def test_layers_and_cloud_give_the_values_of_extract_rails(run, measure, write_cloud, track, tmp_path):
-    cloud = write_cloud(track())
-    paths = {name: tmp_path / f"{name}.gpkg" for name in ("RAILS", "CENTERLINES", "QUALITY")}
-    outcome = run({"INPUT": cloud, "ITERATIONS": 1, "STEP": 0.5, **paths})
-    assert outcome.ok, outcome.error
-    results, _, values = measure(str(paths["CENTERLINES"]), str(paths["RAILS"]), POINTS=str(cloud), STEP=0.5)
-    features = list(QgsVectorLayer(str(paths["QUALITY"]), "quality").getFeatures())
-    assert len(features) == outcome.results["STATION_COUNT"] == results["STATION_COUNT"] > 20
-    for name, found in values.items():
-        expected = [np.nan if feature[name] == NULL else feature[name] for feature in features]
-        np.testing.assert_allclose(found, expected, rtol=1e-6, atol=LAST_DIGIT, err_msg=name)
-    assert outcome.results["SIGMA"] == pytest.approx(results["SIGMA"], abs=0.01)
-    assert values["points"].sum() > 3000
 
 
 def test_a_cloud_is_measured_square_by_square(run, measure, write_cloud, track, tmp_path, monkeypatch):

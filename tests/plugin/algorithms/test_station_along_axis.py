@@ -75,14 +75,6 @@ def test_points_get_kilometre_offset_and_side_and_keep_their_fields(station):
     assert warnings == []
 
 
-def test_posts_with_texts_and_a_field_of_their_own(station):
-    posts = layer(
-        "Point", "POINT(0 3)", "POINT(500 -3)", fields="&field=board:string(9)", values=[("7,5 + 0",), ("8.0",)]
-    )
-    _, values, _ = station(layer("Point", *PLACES), layer("LineString", AXIS), POSTS=posts, POST_FIELD="board")
-    assert values["km"] == [7.6, 7.7505, 8.499]
-
-
 @pytest.mark.parametrize("crs", ["EPSG:4326", "EPSG:32644"])
 def test_an_axis_in_another_system_is_transformed_and_that_is_said(station, crs):
     axis = moved(layer("LineStringM", AXIS_M), crs)
@@ -90,32 +82,3 @@ def test_an_axis_in_another_system_is_transformed_and_that_is_said(station, crs)
     np.testing.assert_allclose(values["km"], [12.1, 12.2505, 12.999], atol=2e-6)
     np.testing.assert_allclose(values["offset_m"], [4.0, -2.5, 0.0], atol=0.02)
     assert (warnings == [f"AXIS is in {crs} and was transformed to EPSG:32643."]) == (crs == "EPSG:4326")
-
-
-def test_on_a_ring_kilometres_run_once_round_and_either_end_is_meant_where_it_closes(station):
-    angle = np.linspace(0, 2 * np.pi, 2001)
-    ring = ", ".join(f"{500 * np.sin(one):.6f} {500 - 500 * np.cos(one):.6f}" for one in angle)
-    places = layer("Point", "POINT(498 500)", "POINT(-498 500)", "POINT(0.5 2)")
-    _, values, _ = station(places, layer("LineString", f"LINESTRING({ring})"), START_KM=1.0)
-    np.testing.assert_allclose(values["km"][:2], [1 + 0.25 * np.pi, 1 + 0.75 * np.pi], atol=2e-5)
-    assert values["ambiguous"] == [0, 0, 1]
-
-
-def test_fields_of_the_same_name_stay(station):
-    places = layer("Point", PLACES[0], fields="&field=km:double", values=[(99.0,)])
-    _, values, _ = station(places, layer("LineStringM", AXIS_M))
-    assert (values["km"], values["km_2"]) == ([99.0], [12.1])
-
-
-@pytest.mark.parametrize("name", ["stations.csv", "Größe 1.gpkg"])
-def test_files(station, run_step, tmp_path, name):
-    outcome = run_step(
-        "stationalongaxis",
-        {
-            "INPUT": layer("MultiPoint", "MULTIPOINT((100 4))"),
-            "AXIS": layer("LineStringM", AXIS_M),
-            "OUTPUT": tmp_path / name,
-        },
-    )
-    assert outcome.ok, outcome.error
-    assert "12.1+00.00" in (tmp_path / name).read_bytes().decode("latin-1")

@@ -1,7 +1,7 @@
 import pytest
 from qgis.core import QgsCoordinateReferenceSystem, QgsPointCloudLayer, QgsProject, QgsProperty, QgsVectorLayer
+from rail_extract.core.clouds.header import catalogue_text
 from rail_extract.core.clouds.readers import read_header
-from rail_extract.core.clouds.vpc import catalogue_text
 from rail_extract.core.errors import CloudError
 from rail_extract.core.jobs.clouds import CloudSource
 from rail_extract.rail_extract_plugin.reading.clouds import cloud_source

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 from memory_layers import layer_of
-from qgis.core import QgsGeometry, QgsLineString, QgsProcessingContext
+from qgis.core import QgsProcessingContext
 from rail_extract.core.jobs.features import read_lines
 from rail_extract.core.progress import SILENT
 from rail_extract.rail_extract_plugin.reading.layers import LayerSource
@@ -121,36 +121,3 @@ def test_lines_of_zero_length_and_empty_parts_are_skipped(layer):
     repeated = "LINESTRING Z (500000 3000000 1, 500000 3000000 1, 500010 3000000 1)"
     rails, _ = rails_of(layer(still, "LINESTRING Z EMPTY", repeated))
     assert [len(rail.xyz) for rail in rails] == [2]
-
-
-def test_hand_drawn_rails_make_a_track(layer, run_step, context):
-    outcome = run_step("buildtrackcenterlines", {"INPUT": layer(LEFT, RIGHT), "OUTPUT": "memory:tracks"})
-    assert outcome.ok, outcome.error
-    (track,) = context.getMapLayer(outcome.results["OUTPUT"]).getFeatures()
-    assert (track["left_ids"], track["right_ids"]) == ("1", "2")
-    assert track["cant_mm"] == pytest.approx(-20, abs=0.01)
-    assert track["gauge_mm"] == pytest.approx(1435.1, abs=0.1)
-    assert outcome.results["CENTERLINE_COUNT"] == 1
-    assert outcome.results["CENTERLINE_LENGTH"] == pytest.approx(20, abs=0.1)
-    assert outcome.results["CENTERLINE_LENGTH"] == pytest.approx(track["length_m"])
-    assert track.geometry().constGet().is3D()
-    assert {round(vertex.z(), 3) for vertex in track.geometry().vertices()} == {100.01}
-
-
-def test_three_rails_make_two_tracks_in_one_run(layer, run_step, context):
-    shared, narrow, wide = (
-        f"LINESTRING Z (500000 {3000000 + left} 100, 500020 {3000000 + left} 100)" for left in (0, 1.072, 1.507)
-    )
-    outcome = run_step(
-        "buildtrackcenterlines",
-        {"INPUT": layer(shared, narrow, wide), "OTHER_GAUGES": "1000;1067", "OUTPUT": "memory:tracks"},
-    )
-    assert outcome.ok, outcome.error
-    tracks = context.getMapLayer(outcome.results["OUTPUT"]).getFeatures()
-    found = [(track["left_ids"], track["right_ids"], round(track["gauge_mm"])) for track in tracks]
-    assert found == [("3", "1", 1435), ("2", "1", 1000)]
-
-
-def test_empty_lines_are_left_out(layer):
-    rails, _ = rails_of(layer(LEFT, QgsGeometry(QgsLineString()), RIGHT))
-    assert [len(rail.xyz) for rail in rails] == [2, 2]

@@ -2,8 +2,7 @@
 
 import numpy as np
 from rail_extract.core.clouds.crs import import_pyproj
-from rail_extract.core.files.rail_rasters import RasterSource
-from rail_extract.core.files.raster_file import header_for
+from rail_extract.core.files.rail_rasters import RasterSource, header_for
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.raster import cell_size, rasterize
 from rail_extract.core.standards import STANDARDS

@@ -10,6 +10,7 @@ from itertools import product
 from pathlib import Path
 
 import pytest
+from heard import Heard
 from rail_extract.core.errors import Cancelled, RailExtractError
 from rail_extract.core.progress import SILENT, Progress
 from rail_extract.rail_extract_plugin.algorithms import install_packages
@@ -87,15 +88,13 @@ def test_numpy_of_qgis_determines_the_version(put, add_wheel):
 
 
 def test_other_packages_of_qgis_are_kept(put, add_wheel, folder):
-    class Listener(Progress):
-        def warning(self, text):
-            warnings.append(text)
-
-    warnings = []
+    heard = Heard()
     add_wheel("railfirst", requires=("laspy>=99",))
     add_wheel("laspy", "99.0")
-    assert put("railfirst", Listener()) == "railfirst 1.0"
-    assert [text for text in warnings if text.startswith("QGIS has laspy ") and text.endswith("used instead of 99.0.")]
+    assert put("railfirst", heard) == "railfirst 1.0"
+    assert [
+        text for text in heard.warnings if text.startswith("QGIS has laspy ") and text.endswith("used instead of 99.0.")
+    ]
     assert "laspy.py" not in names_in(folder)
 
 
@@ -123,14 +122,10 @@ def test_failure_is_a_sentence_and_changes_nothing(put, add_wheel, folder, requi
 
 
 def test_cancel_changes_nothing(put, add_wheel, folder):
-    class Impatient(Progress):
-        def info(self, text):
-            heard.append(text)
-
+    class Impatient(Heard):
         def is_cancelled(self):
-            return any("Processing" in text for text in heard)
+            return any("Processing" in text for text in self.infos)
 
-    heard = []
     add_wheel("railfirst")
     with pytest.raises(Cancelled):
         put("railfirst", Impatient())
@@ -213,17 +208,15 @@ def test_the_locked_version_is_installed(put, add_wheel, monkeypatch, tmp_path):
 
 
 def test_an_index_of_its_own_has_other_files_than_the_list(put, add_wheel, monkeypatch, tmp_path):
-    class Listener(Progress):
-        def info(self, text):
-            infos.append(text)
-
-    infos = []
+    heard = Heard()
     for version in ("1.0", "2.0"):
         add_wheel("railfirst", version)
     lock(monkeypatch, Locked("railfirst", "1.0", (checksum(tmp_path, "railfirst"),)))
     own = tmp_path / "index"
-    assert put("railfirst", Listener(), "--find-links", str(own)) == "railfirst 2.0"
-    assert f"The files of railfirst come from an index of their own, {own}: they are compared with its" in infos[0]
+    assert put("railfirst", heard, "--find-links", str(own)) == "railfirst 2.0"
+    assert (
+        f"The files of railfirst come from an index of their own, {own}: they are compared with its" in heard.infos[0]
+    )
 
 
 def test_a_file_with_another_checksum_is_refused(put, add_wheel, monkeypatch, tmp_path, folder):

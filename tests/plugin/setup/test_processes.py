@@ -1,31 +1,17 @@
 import sys
 
 import pytest
+from heard import Heard
 from rail_extract.core.errors import Cancelled
-from rail_extract.core.progress import Progress
 from rail_extract.rail_extract_plugin.setup.processes import run
-
-
-class Listener(Progress):
-    """Records lines, and cancels after a given number."""
-
-    def __init__(self, most: int = 1000) -> None:
-        self.lines: list[str] = []
-        self._most = most
-
-    def info(self, text):
-        self.lines.append(text)
-
-    def is_cancelled(self):
-        return len(self.lines) >= self._most
 
 
 def test_output_including_errors_comes_line_by_line():
     code = "import sys; print('one'); print(); print('zwei ü', file=sys.stderr, end='')"
-    listener = Listener()
-    ended = run(sys.executable, ["-u", "-c", code], {"PYTHONIOENCODING": "utf-8"}, listener)
+    heard = Heard()
+    ended = run(sys.executable, ["-u", "-c", code], {"PYTHONIOENCODING": "utf-8"}, heard)
     assert ended.code == 0
-    assert listener.lines == ["one", "zwei ü"]
+    assert heard.infos == ["one", "zwei ü"]
     assert ended.output == "one\n\nzwei ü\n"
 
 
@@ -47,5 +33,5 @@ def test_missing_or_crashed_program_has_no_exit_code():
 def test_cancel_ends_the_program(tmp_path):
     code = "import sys, time; print('begun', flush=True); time.sleep(60); open(sys.argv[1], 'w')"
     with pytest.raises(Cancelled):
-        run(sys.executable, ["-c", code, str(tmp_path / "late")], progress=Listener(most=1))
+        run(sys.executable, ["-c", code, str(tmp_path / "late")], progress=Heard(cancel_after=0))
     assert not list(tmp_path.iterdir())

@@ -3,20 +3,16 @@ import pytest
 from qgis.core import (
     NULL,
     QgsProcessing,
-    QgsProcessingUtils,
-    QgsVectorLayer,
-    QgsWkbTypes,
 )
 from rail_extract.core.fields import CENTERLINE_FIELDS, CENTERLINES, QUALITY_FIELDS, RAIL_FIELDS, RAILS
 from rail_extract.core.files.layers import lines_layer
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.rails import Centerline, RailLine
 from rail_extract.rail_extract_plugin.writing.destinations import destinations
-from rail_extract.rail_extract_plugin.writing.layers import add_features, features, fields, output_crs
+from rail_extract.rail_extract_plugin.writing.layers import features, fields
 
 FEET = LocalFrame(np.array([1000.0, 2000.0, 10.0]), horizontal_unit_m=0.3048, vertical_unit_m=0.3048)
 XYZ = np.array([[0.0, 0.0, 0.0], [3.048, 0.0, 0.3048]])
-COLUMNS = [column for column in CENTERLINE_FIELDS if column.kind is float]
 
 
 def test_rail_becomes_a_feature_in_the_units_of_the_cloud(qgis):
@@ -54,30 +50,6 @@ ALL_FIELDS = pytest.mark.parametrize("columns", [RAIL_FIELDS, CENTERLINE_FIELDS,
 def test_shapefiles_keep_the_field_names(qgis, columns):
     assert fields(columns).names() == [column.name for column in columns]
     assert max(map(len, fields(columns).names())) <= 10
-
-
-@pytest.mark.parametrize("suffix", [".gpkg", ".shp", ".geojson", ".csv"])
-def test_numbers_have_the_decimals_of_their_fields(tmp_path, context, suffix):
-    line = Centerline(XYZ, 1, 10, (1, 4), (2,), 1435.2189, 1 / 3, -20.04, -0.01, 123456.789)
-    path = str(tmp_path / f"lines{suffix}")
-    shape, crs = QgsWkbTypes.Type.LineStringZ, output_crs(None)
-    sink, layer_id = QgsProcessingUtils.createFeatureSink(path, context, fields(CENTERLINE_FIELDS), shape, crs)
-    add_features(sink, features(lines_layer(CENTERLINES, [line]), FEET))
-    del sink
-    layer = QgsVectorLayer(layer_id, "lines", "ogr")
-    (feature,) = layer.getFeatures()
-    assert float(feature["length_m"]) == 3.063
-    shown = {column.name: layer.fields().field(column.name).displayString(feature[column.name]) for column in COLUMNS}
-    digits = {name: text.replace(",", "") for name, text in shown.items()}
-    assert {name: float(text) for name, text in digits.items()} == {
-        "length_m": 3.063,
-        "gauge_mm": 1435.2,
-        "gaugesd_mm": 0.3,
-        "cant_mm": -20.0,
-        "cantmax_mm": 0.0,
-        "bridged_m": 123456.79,
-    }
-    assert all(len(digits[column.name].partition(".")[2]) <= column.decimals for column in COLUMNS), shown
 
 
 @pytest.mark.parametrize("value", [None, "", "memory:", QgsProcessing.TEMPORARY_OUTPUT])

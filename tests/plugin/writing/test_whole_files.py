@@ -1,7 +1,6 @@
 """Files of an algorithm: whole, alone in their place, and without harm to the tables next to them."""
 
 import sqlite3
-import stat
 
 import pytest
 from memory_layers import layer_of
@@ -105,26 +104,6 @@ def test_two_tables_of_one_file_in_one_run(run_step, bench, tmp_path):
     outcome = run_step("extractrails", {"INPUT": cloud, "ITERATIONS": 1, **outputs})
     assert outcome.ok, outcome.error
     assert tables(path) == {"rails": 2, "centerlines": 1}
-
-
-def test_a_link_stays_and_its_file_is_new(build, tmp_path):
-    (tmp_path / "data").mkdir()
-    target, link = tmp_path / "data" / "real.gpkg", tmp_path / "link.gpkg"
-    target.write_text("old")
-    link.symlink_to(target)
-    found = build(link)
-    assert QgsVectorLayer(found, "tracks", "ogr").featureCount() == 1
-    assert link.is_symlink()
-    assert tables(target) == {"real": 1}
-
-
-@pytest.mark.parametrize("name", ["tracks.gpkg", "tracks.shp", "tracks.geojson"])
-def test_a_file_that_only_its_owner_may_read_stays_so(build, tmp_path, name):
-    build(tmp_path / name)
-    for file in tmp_path.iterdir():
-        file.chmod(0o600)
-    build(tmp_path / name)
-    assert {stat.S_IMODE(file.stat().st_mode) for file in tmp_path.iterdir()} == {0o600}
 
 
 @pytest.mark.parametrize("name", ["100 % ä#1.gpkg", "a?b='c'.gpkg"])

@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from rail_extract.core.heads.edgeless import Ridge
+from rail_extract.core.heads.edges import Ridge
 from rail_extract.core.heads.head_points import HeadPoints, stations_along
 
 WIDTH, LENGTH_M, BEND = 0.072, 40.0, 8.0

@@ -1,46 +1,28 @@
-"""The parameters that several jobs share; `outputs` has what comes out."""
+"""Parameters of several jobs for how they compute: search, network, lines, pairing, geometry and processes."""
 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
-from ..design_numbers import KM
 from ..frpdf import DEVICES, ENGINES, MAX_PASSES
 from ..frpdf.models import NAMES
-from ..kilometres.text import HECTOMETRES, NOTATIONS
 from ..parameters import (
     DEFAULT_STEP_M,
     DEFAULT_WORKERS,
     GEOMETRY,
-    LEAVE_OUT,
     MAX_WORKERS,
     METHODS,
     Parameters,
 )
-from ..standards import CUSTOM, DEFAULT, DETECT, LAST_CLASS, RAIL_CLASS, STANDARDS
+from ..standards import LAST_CLASS, RAIL_CLASS
 from .declaration import (
     FINE_M_DECIMALS,
-    LINE,
-    MM_DECIMALS,
-    POINT,
-    POLYGON,
-    TABLE,
     Choice,
-    Cloud,
-    Extent,
-    FieldInput,
     FileInput,
-    LayerInput,
     Number,
     Parameter,
-    RasterInput,
-    System,
     Text,
 )
-
-if TYPE_CHECKING:
-    pass
 
 # The maxima below only reject values that must be millimetres in a field of metres; they are not recommendations.
 
@@ -59,66 +41,7 @@ MAX_CROWN_RADIUS_M = 10_000.0
 MAX_LENGTH_M = 100_000.0
 """Longer than any gap to close, any minimum line length and any step between stations."""
 
-INCREASING, DECREASING = DIRECTIONS = ("INCREASING", "DECREASING")
-"""Whether kilometres increase from the first vertex of an axis."""
-
 WEIGHT_FILES = "Weights (*.npz)"
-
-CLOUD = Cloud(
-    "INPUT",
-    "Point cloud (layer, file or folder)",
-    "A loaded point cloud layer, or the path of a LAS, LAZ or COPC file, of a folder of such files, or of "
-    "a virtual point cloud (.vpc).",
-)
-RAW_CLOUD = replace(CLOUD, help=f"{CLOUD.help} It needs no classes.")
-RAIL_CLASSES = Text(
-    "RAIL_CLASSES",
-    "Rail classes",
-    "Classes of the points on rails, such as 10 or 10,11. Each class is processed separately.",
-    default=str(RAIL_CLASS),
-)
-RASTER = RasterInput(
-    "INPUT",
-    "Rail raster",
-    "One band per class, with 1 where there is rail, as from Rasterize Rail Points. North up, square cells.",
-)
-
-STANDARD = Choice(
-    "STANDARD",
-    "Rail standard",
-    "Rail profile and gauge, which give the rail spacing and the railhead width. CUSTOM takes both from GAUGE and "
-    "HEAD_WIDTH.",
-    options=(*STANDARDS, CUSTOM),
-    default=DEFAULT,
-)
-DETECTED_STANDARD = replace(
-    STANDARD,
-    help=f"{STANDARD.help} DETECT measures the rails in part of the points, and says how sure it is.",
-    options=(*STANDARD.options, DETECT),
-)
-GAUGE = Number(
-    "GAUGE",
-    "Gauge [mm]",
-    "Distance between the inner faces of the two railheads. Leave empty to use the value of the standard.",
-    advanced=True,
-    optional=True,
-    low=1.0,
-    decimals=MM_DECIMALS,
-)
-HEAD_WIDTH = replace(
-    GAUGE,
-    name="HEAD_WIDTH",
-    label="Railhead width [mm]",
-    help="Width of the head of one rail. Leave empty to use the value of the standard.",
-)
-RAIL = (STANDARD, GAUGE, HEAD_WIDTH)
-
-_UNSTATED = "Needed for a raster from other software, which does not state {}. Overrides the tag of the raster."
-RASTER_RAIL = (
-    replace(GAUGE, help=_UNSTATED.format("its gauge")),
-    replace(HEAD_WIDTH, help=_UNSTATED.format("the width")),
-)
-"""Gauge and railhead width for a raster without tags."""
 
 OTHER_GAUGES = Text(
     "OTHER_GAUGES",
@@ -140,62 +63,6 @@ PAIRING: tuple[Parameter, ...] = (
     ),
 )
 
-CRS = System(
-    "CRS",
-    "CRS of a cloud without one",
-    "Projected coordinate system for files that do not state one; other files keep their own.",
-    advanced=True,
-    optional=True,
-)
-LEFT_OUT = Choice(
-    "LEAVE_OUT",
-    "Points to leave out",
-    "OVERLAP leaves out points that are marked as overlap of strips, SYNTHETIC those that are marked as computed, not "
-    "measured. Withheld points are always left out.",
-    advanced=True,
-    optional=True,
-    options=LEAVE_OUT,
-    several=True,
-)
-AREA: tuple[Parameter, ...] = (
-    Extent(
-        "EXTENT",
-        "Extent",
-        "Only points inside this rectangle are read. Leave empty to read all points.",
-        advanced=True,
-        optional=True,
-    ),
-    LayerInput(
-        "MASK",
-        "Mask",
-        "Only points inside these polygons are read, for example a strip along the line.",
-        advanced=True,
-        optional=True,
-        transformed=True,
-        kinds=(POLYGON,),
-    ),
-    CRS,
-    LEFT_OUT,
-)
-
-GUIDE = LayerInput(
-    "GUIDE",
-    "Guide",
-    "Lines along the tracks, from a map such as OpenStreetMap or drawn by hand. Rails are searched near them only. "
-    "Lines in another coordinate system are transformed.",
-    advanced=True,
-    optional=True,
-    transformed=True,
-)
-SEEDS = LayerInput(
-    "SEEDS",
-    "Seeds",
-    "Points on railheads, or lines along them, one for each rail or track to follow. In another coordinate system they "
-    "are transformed. The map tool Grow Rails makes such a layer.",
-    optional=True,
-    transformed=True,
-    kinds=(POINT, LINE),
-)
 METHOD: tuple[Parameter, ...] = (
     Choice(
         "METHOD",
@@ -215,6 +82,7 @@ METHOD: tuple[Parameter, ...] = (
         kinds=WEIGHT_FILES,
     ),
 )
+
 CONTENT: tuple[Parameter, ...] = (
     Number(
         "RAIL_CLASS",
@@ -237,14 +105,6 @@ CONTENT: tuple[Parameter, ...] = (
 )
 """The class of rail points, and whether the others are written as well."""
 
-RAILS_OF_CANT = LayerInput(
-    "RAILS",
-    "Rails",
-    "3D lines of both rails, for the cant where there is no track geometry.",
-    advanced=True,
-    optional=True,
-)
-
 MODEL = Choice(
     "MODEL",
     "Model",
@@ -253,6 +113,7 @@ MODEL = Choice(
     options=NAMES,
     default=Parameters.model,
 )
+
 DEVICE = Choice(
     "DEVICE",
     "Device of the network",
@@ -261,6 +122,7 @@ DEVICE = Choice(
     options=DEVICES,
     default=Parameters.device,
 )
+
 CLEANUP: tuple[Parameter, ...] = (
     Number(
         "ITERATIONS",
@@ -292,6 +154,7 @@ SMOOTHING_XY = Number(
     low=0.05,
     high=MAX_SMOOTHING_M,
 )
+
 TOLERANCE_Z = Number(
     "TOLERANCE_Z",
     "Tolerance in height [m]",
@@ -301,6 +164,7 @@ TOLERANCE_Z = Number(
     low=0.001,
     high=MAX_TOLERANCE_M,
 )
+
 HEIGHTS = (
     Number(
         "SMOOTHING_Z",
@@ -334,6 +198,7 @@ HEIGHTS = (
         high=MAX_CROWN_RADIUS_M,
     ),
 )
+
 MAX_GAP = Number(
     "MAX_GAP",
     "Longest gap to close [m]",
@@ -343,6 +208,7 @@ MAX_GAP = Number(
     default=Parameters.max_gap_m,
     high=MAX_LENGTH_M,
 )
+
 SIMPLIFY_XY = Number(
     "SIMPLIFY_XY",
     "Simplification in plan [m]",
@@ -352,6 +218,7 @@ SIMPLIFY_XY = Number(
     high=MAX_SIMPLIFICATION_M,
     decimals=FINE_M_DECIMALS,
 )
+
 SIMPLIFY_Z = replace(
     SIMPLIFY_XY,
     name="SIMPLIFY_Z",
@@ -359,6 +226,7 @@ SIMPLIFY_Z = replace(
     help="Vertices are removed while the line stays within this distance in height.",
     default=Parameters.simplify_z_m,
 )
+
 MIN_LENGTH = Number(
     "MIN_LENGTH",
     "Shortest line [m]",
@@ -367,6 +235,7 @@ MIN_LENGTH = Number(
     default=Parameters.min_length_m,
     high=MAX_LENGTH_M,
 )
+
 LINES = (
     SMOOTHING_XY,
     *HEIGHTS,
@@ -394,6 +263,7 @@ STEP = Number(
     low=0.1,
     high=MAX_LENGTH_M,
 )
+
 WORKERS = Number(
     "WORKERS",
     "Processes",
@@ -403,78 +273,4 @@ WORKERS = Number(
     default=DEFAULT_WORKERS,
     high=MAX_WORKERS,
     whole=True,
-)
-
-
-def axis(optional: bool) -> tuple[Parameter, ...]:
-    """Return the axis and what states its kilometres: the line, its start and posts in sight unless it is optional."""
-    return (
-        LayerInput(
-            "AXIS",
-            "Axis",
-            "Line that carries the kilometres: with M values in kilometres or metres, or with the fields below. In "
-            "another coordinate system it is transformed.",
-            advanced=optional,
-            optional=optional,
-            transformed=True,
-        ),
-        Number(
-            "START_KM",
-            "Start of the axis [km]",
-            "Kilometre at the first vertex of the axis, for an axis that is a single line. It overrides M values.",
-            advanced=optional,
-            optional=True,
-            low=KM.low,
-            high=KM.high,
-            decimals=6,
-        ),
-        Choice(
-            "DIRECTION",
-            "Kilometres along the axis",
-            "Whether kilometres increase or decrease from the start of the axis; used with its start kilometre.",
-            advanced=True,
-            options=DIRECTIONS,
-            default=INCREASING,
-        ),
-        LayerInput(
-            "POSTS",
-            "Kilometre posts",
-            "Points of kilometre or hectometre posts up to 50 m beside the axis. Kilometres are interpolated between "
-            "them. They override the start and M values.",
-            advanced=optional,
-            optional=True,
-            transformed=True,
-            kinds=(POINT,),
-        ),
-        *_NOTATION,
-    )
-
-
-_NOTATION: tuple[Parameter, ...] = (
-    FieldInput(
-        "POST_FIELD",
-        "Field of the posts with the kilometre",
-        "Numbers, or texts such as 12.3+45. Empty means the first of km, kilometre, km_text, station.",
-        advanced=True,
-        optional=True,
-        of="POSTS",
-    ),
-    LayerInput(
-        "JUMPS",
-        "Jumps of the kilometres",
-        "Table with the fields km_back, the kilometre before each jump, and km_ahead, the one behind it, in the order "
-        "of increasing kilometres.",
-        advanced=True,
-        optional=True,
-        kinds=(TABLE,),
-    ),
-    Choice(
-        "FORMAT",
-        "Kilometres as text",
-        "HECTOMETRES writes 12.3+45.67, KILOMETRES 12+345.67, GERMAN 12,3 + 46, and MILES 7 mi 1181.39 yd, in miles "
-        "and yards.",
-        advanced=True,
-        options=tuple(NOTATIONS),
-        default=HECTOMETRES,
-    ),
 )

@@ -2,7 +2,7 @@ import os
 import signal
 
 import pytest
-from rail_extract.core.commands.options import Console
+from rail_extract.core.commands.jobs import Console
 from rail_extract.core.errors import Cancelled
 
 

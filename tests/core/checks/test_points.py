@@ -1,0 +1,223 @@
+"""Points that are too thin for rails are seen before any raster is made; gauge and head width that points show."""
+
+import numpy as np
+import pytest
+from heard import Heard
+from rail_extract.core.checks.points import (
+    MIN_IN_WINDOW,
+    WINDOW_M,
+    measure_spacings,
+    occupied_squares,
+    plausible,
+    warn_of_airborne,
+    warn_of_unexplained,
+)
+from rail_extract.core.clouds.points import RailPoints
+from rail_extract.core.errors import CloudError
+from rail_extract.core.frame import LocalFrame
+from rail_extract.core.rails import RailLine
+from rail_extract.core.standards import GAUGE_RANGE_MM, HEAD_WIDTH_RANGE_MM, STANDARDS, closest_standard
+from rail_extract.core.tiles.grid import MemorySource, lay_out
+
+SIDE_M = 500.0
+RNG = np.random.default_rng(4)
+
+
+def source(*parts, class_code=10):
+    return MemorySource(RailPoints(np.concatenate(parts), LocalFrame(np.zeros(3)), class_code), SIDE_M)
+
+
+def rail(start_m=0.0, length_m=100.0, per_metre=20, y_m=7.0):
+    """The sparsest rail: points anywhere on its head."""
+    count = int(length_m * per_metre)
+    return np.column_stack(
+        [start_m + RNG.uniform(0, length_m, count), y_m + RNG.uniform(-0.036, 0.036, count), np.zeros(count)]
+    )
+
+
+def strays(count, side_m=1e6):
+    return np.column_stack([RNG.uniform(-side_m / 2, side_m / 2, (count, 2)), np.zeros(count)])
+
+
+def test_the_sparsest_rail_is_plausible():
+    heard, one = Heard(), source(rail())
+    assert plausible([one], heard) == [one]
+    assert not heard.warnings
+
+
+def test_the_sparsest_rail_among_strays_is_plausible():
+    one = source(rail(length_m=20.0), strays(5_000))
+    assert plausible([one]) == [one]
+
+
+@pytest.mark.parametrize("factor", [100, 1000])
+@pytest.mark.parametrize("per_metre", [20, 600])
+def test_points_in_a_smaller_unit_are_refused(factor, per_metre):
+    with pytest.raises(CloudError, match=r"class 10 are \S+ m apart over \d+ m, .*centimetres or millimetres"):
+        plausible([source(rail(per_metre=per_metre) * factor)])
+
+
+def test_the_spacing_is_that_of_the_points():
+    line = np.column_stack([np.arange(0, 1000, 2.8), np.zeros(358), np.zeros(358)])
+    with pytest.raises(CloudError, match=r"are 2\.8 m apart over 1000 m"):
+        plausible([source(line)])
+
+
+def test_a_thin_class_beside_a_plausible_one_is_left_out_with_a_warning():
+    heard, good, thin = Heard(), source(rail()), source(rail() * 100, class_code=11)
+    assert plausible([thin, good], heard) == [good]
+    (said,) = heard.warnings
+    assert said.startswith("The points of class 11 are ")
+
+
+def test_points_in_a_larger_unit_give_a_warning():
+    heard, one = Heard(), source(rail(per_metre=600) / 1000)
+    assert plausible([one], heard) == [one]
+    (said,) = heard.warnings
+    assert said.startswith("All points of class 10 are within 0.1 m of each other: if the coordinates")
+
+
+def test_few_points_are_not_judged():
+    one = source(strays(50))
+    assert plausible([one]) == [one]
+
+
+def test_squares_of_strays_are_left_out_and_squares_of_rails_are_kept():
+    one = source(rail(length_m=1200.0), strays(5_000))
+    kept = {square.key for square in occupied_squares([one], one)}
+    assert kept == {(0, 0), (1, 0), (2, 0)}
+    assert len(lay_out([one], one)) > 4_000
+
+
+def test_a_square_into_which_a_rail_reaches_is_kept():
+    end = rail(start_m=400.0, length_m=100.2)
+    assert 0 < np.count_nonzero(end[:, 0] >= SIDE_M) < MIN_IN_WINDOW
+    one = source(end, rail(start_m=-600.0, length_m=10.0))
+    assert (1, 0) in {square.key for square in occupied_squares([one], one)}
+
+
+def test_points_with_company_across_a_corner_are_no_strays():
+    corner = np.array([SIDE_M, SIDE_M, 0.0])
+    shifts = np.array([[1, 1], [1, -1], [-1, 1], [-1, -1]])
+    heap = np.column_stack([np.repeat(shifts, 3, axis=0), np.zeros(12)]) * (WINDOW_M / 2)
+    one = source(corner + heap, np.array([[5_000.0, 0.0, 0.0]]))
+    assert {square.key for square in occupied_squares([one], one)} == {(0, 0), (0, 1), (1, 0), (1, 1)}
+    less = source(corner + heap[: MIN_IN_WINDOW - 1], np.array([[5_000.0, 0.0, 0.0]]))
+    assert not occupied_squares([less], less)
+
+
+def test_a_cloud_within_one_square_is_never_divided():
+    one = source(strays(20, side_m=100.0))
+    (whole,) = occupied_squares([one], one)
+    assert whole.is_whole_plane
+
+
+def straight(y_m, length_m=100.0):
+    xyz = np.array([[0.0, y_m, 0.0], [length_m, y_m, 0.0]])
+    return RailLine(xyz, 1, 10, points=0, resid_mm=0.0, sigma_mm=0.0, bridged_m=0.0)
+
+
+@pytest.mark.parametrize("length_m", [100.0, 700.0])
+@pytest.mark.parametrize(("others", "said"), [(0, None), (1, None), (2, "33 %"), (4, "20 %")])
+def test_points_far_from_all_rails_give_a_warning(others, said, length_m):
+    one = source(*(rail(y_m=7.0 + 0.5 * number, length_m=length_m) for number in range(others + 1)))
+    heard = Heard()
+    warn_of_unexplained(one, [straight(7.1, length_m)], heard)
+    assert [text[5:9] for text in heard.warnings] == [said] * bool(said)
+
+
+@pytest.mark.parametrize(("per_metre", "said"), [(3, "have 3.0 points per metre"), (9, "have 9.0 points"), (20, "")])
+def test_rails_of_an_airborne_cloud_give_a_warning(per_metre, said):
+    heard = Heard()
+    warn_of_airborne(source(rail(per_metre=per_metre)), [straight(7.0)], heard)
+    assert len(heard.warnings) == bool(said)
+    assert all(said in text and "use Track Centerlines from Airborne Lidar" in text for text in heard.warnings)
+
+
+def test_points_as_thin_as_those_of_an_airborne_cloud_are_refused_with_its_algorithm():
+    with pytest.raises(CloudError, match=r"too far for rails: .* For an airborne cloud, use Track Centerlines"):
+        plausible([source(rail(per_metre=2, length_m=400.0))])
+
+
+def track(spacing_m, width_m, length_m=30.0, density=300, noise_m=0.003, heading=0.6, seed=1):
+    """Points on the tops of two railheads, uphill by 2 %, with scattered points on their feet."""
+    rng = np.random.default_rng(seed)
+    count = int(density * length_m)
+    along = rng.uniform(0, length_m, 2 * count)
+    side = np.repeat([-0.5, 0.5], count) * spacing_m
+    foot = rng.random(2 * count) < 0.1
+    across = side + rng.uniform(-0.5, 0.5, 2 * count) * np.where(foot, 0.13, width_m)
+    height = 0.02 * along - 0.15 * foot
+    xyz = np.column_stack([along, across, height]) + rng.normal(0, noise_m, (2 * count, 3))
+    turn = np.array([[np.cos(heading), np.sin(heading)], [-np.sin(heading), np.cos(heading)]])
+    return np.column_stack([xyz[:, :2] @ turn, xyz[:, 2]])
+
+
+@pytest.mark.parametrize("name", ["EN_60E1_1435", "IN_75R_1000", "JIS_60_1067", "IN_60KG_1676", "RU_R65_1520"])
+def test_spacing_and_width_of_a_track(name):
+    standard = STANDARDS[name]
+    points = track(standard.gauge_m + standard.head_width_m, standard.head_width_m)
+    spacing_m, width_m = measure_spacings(points).most_common()
+    assert spacing_m == pytest.approx(standard.gauge_m + standard.head_width_m, abs=0.001)
+    assert width_m == pytest.approx(standard.head_width_m, abs=0.004)
+    assert closest_standard(spacing_m, width_m).gauge_m == standard.gauge_m
+
+
+def test_sparse_points_are_enough():
+    spacing_m, _ = measure_spacings(track(1.507, 0.072, length_m=100.0, density=12)).most_common()
+    assert spacing_m == pytest.approx(1.507, abs=0.003)
+
+
+def test_a_part_of_the_points_is_enough_where_they_are_dense():
+    spacing_m, width_m = measure_spacings(track(1.507, 0.072, length_m=3.0, density=10_000)).most_common()
+    assert spacing_m == pytest.approx(1.507, abs=0.001)
+    assert width_m == pytest.approx(0.072, abs=0.004)
+
+
+def test_every_gauge_of_a_mixed_line_is_included():
+    both = [track(1.507, 0.072), track(1.072, 0.072, seed=2) + [40.0, 40.0, 0.0]]
+    spacings = measure_spacings(np.concatenate(both))
+    assert [spacings.include(one, 0.05) for one in (1.507, 1.072, 1.3)] == [True, True, False]
+
+
+def test_one_rail_or_too_few_points_give_none():
+    rail = track(1.507, 0.072)
+    rail = rail[: len(rail) // 2]
+    for points in (
+        rail,
+        rail[:5],
+        rail[:0],
+        np.random.default_rng(1).uniform(0, 30, (2000, 3)),
+        rail[:1].repeat(900, 0),
+    ):
+        spacings = measure_spacings(points)
+        assert spacings.most_common() is None
+        assert not spacings.include(1.507, 0.05)
+
+
+@pytest.mark.parametrize(
+    ("spacing_m", "width_m", "name"),
+    [
+        (1.0619, 0.0622, "IN_75R_1000"),
+        (1.5055, 0.0707, "EN_60E1_1435"),
+        (1.5120, 0.0715, "EN_60E1_1435"),
+        (1.5115, 0.0765, "US_132RE_1435"),
+        (1.7385, 0.0706, "EN_60E1_1668"),
+        (1.7365, 0.0685, "EN_54E1_1668"),
+        (1.5010, 0.0930, "EN_60E1_1435"),  # a blunt cloud
+        (1.7480, 0.1100, "IN_60KG_1676"),
+        (1.0620, 0.0950, "IN_75R_1000"),
+        (1.300, 0.070, None),
+    ],
+)
+def test_closest_standard(spacing_m, width_m, name):
+    standard = closest_standard(spacing_m, width_m)
+    assert (standard and standard.name) == name
+
+
+@pytest.mark.parametrize("end", [0, 1])
+def test_rails_are_a_track_from_the_least_to_the_largest_gauge_with_the_widest_heads(end):
+    spacing_m = (GAUGE_RANGE_MM[end] + HEAD_WIDTH_RANGE_MM[end]) / 1000
+    beyond_m = 0.02 if end else -0.02
+    assert measure_spacings(track(spacing_m - beyond_m, 0.07)).include(spacing_m - beyond_m, 0.003)
+    assert not len(measure_spacings(track(spacing_m + beyond_m, 0.07)).distance_m)
