@@ -18,7 +18,7 @@ SECTIONS = {
         *("GAUGE", "HEAD_WIDTH", "OTHER_GAUGES", "CENTERLINE_TOLERANCE", "RAIL_HEIGHT", "REFERENCE_RAILS", "QUALITY"),
         *("RAILS", "REFERENCE_SIGMA", "INPUT_SIGMA", "REACH", "STEP", "TRANSITIONS", "ROUND", "FIXED"),
     ),
-    "Clearance": ("FLOOR", "TRAINS", "DISTANCE"),
+    "Clearance": ("PROFILE_FILE", "MARGIN", "WIDENING", "FLOOR", "TRAINS", "DISTANCE"),
     "Axis": ("AXIS", "START_KM", "POSTS", "POST_FIELD", "JUMPS", "DIRECTION", "FORMAT"),
     "Computer": ("WORKERS",),
     "Files of alignments": ("VERTICAL_CURVES", "EAST_FIRST"),
