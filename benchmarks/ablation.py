@@ -159,8 +159,6 @@ SWITCHES = (
     _rule("airborne.fitting.MARGIN", -np.inf),
     _rule("airborne.fitting.OWN_GAIN", -np.inf),
     _rule("airborne.fitting.LONG_GAIN", 0.0),
-    _rule("airborne.fitting.LONG_SHARE", 0.0),
-    _rule("airborne.fitting.WIDEST_M", np.inf),
     _rule("airborne.fitting.RIVAL_SHARE", np.inf),
     _rule("airborne.fitting.REPEATED_SHARE", np.inf),
     _rule("airborne.fitting.ASIDE_M", np.inf),

@@ -1,4 +1,4 @@
-"""Print the errors of extracted lines on synthetic scenes, next to those of a plain script.
+"""Print the errors of extracted lines, and of the lines of a plain script, on synthetic scenes.
 
 Run `python benchmarks/accuracy.py [SCENE ...] [--model fast]`.
 """
@@ -27,7 +27,7 @@ def main() -> None:
 
 
 def _measured(name: str, model: str) -> Result:
-    """Measure one scene in a separate process, so that its peak memory is that of the scene."""
+    """Measure one scene in a separate process, so that its peak memory belongs to the scene."""
     print(name, file=sys.stderr, flush=True)
     with processes(1) as pool:
         return pool.submit(measure, SCENES[name](), model).result()

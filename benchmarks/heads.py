@@ -29,7 +29,7 @@ from rail_extract.laboratory.scenes import adversarial, plain, strips, switches,
 from rail_extract.laboratory.scenes.scene import RAIL, Scene
 
 SEEDS, QUICK_SEEDS = range(101, 107), range(101, 103)
-"""Seeds of each kind; other ones than those of the scenes on which constants were set."""
+"""Seeds of each kind; constants were set on scenes with other seeds."""
 
 TOLERANCE_M = 0.05
 """Errors count where a line is this close to its rail."""
@@ -130,7 +130,7 @@ def errors_of(rails: Sequence[RailLine], true: Sequence[np.ndarray]) -> list[flo
 
 
 def drawn_once(scene: Scene, parameters: Parameters, folder: Path) -> LineNetwork:
-    """Return the lines that the raster of a scene shows: from the folder if its points are the same, drawn else."""
+    """Return the lines drawn from the raster of a scene, or those in the folder if its points are the same."""
     points = scene.rail_points()
     path = folder / f"{scene.name}_{hashlib.sha256(points.xyz.tobytes()).hexdigest()[:16]}.npz"
     if not path.exists():
@@ -160,7 +160,7 @@ def written(name: str, row: Sequence[float]) -> str:
 
 
 def compared(figures: dict[str, dict[str, list[float]]], before: dict[str, dict[str, list[float]]]) -> str:
-    """Format the ratios of errors and of times to those of another run, by kind and as a geometric mean.
+    """Format errors and times relative to another run, by kind and as a geometric mean.
 
     The last columns are the changes in mm, across and in height.
     """

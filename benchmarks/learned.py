@@ -1,4 +1,4 @@
-"""Compare rail points found by geometry with those of a trained network, scene by scene.
+"""Compare rail points found by geometry and by a trained network, scene by scene.
 
 Run `python benchmarks/learned.py labelled FOLDER` to write the labelled tiles of the published training, train with
 `python -m rail_extract train-classifier FOLDER --weights rails.npz --card rails.html --epochs 6`, and then run

@@ -40,8 +40,10 @@ NEAR_M = 0.10
 """A line is right within this distance of labelled points: people label to some centimetres."""
 
 ON_HEAD_M, BELOW_M, ON_TOP_M = 0.06, 0.012, 0.02
-"""Distance from the line, and depth below it, of the points that show its error across: the sides of a head, of which a
-scanner sees one, are deeper. Distance of those that show its error in height."""
+"""Points within the first distance of a line, and not deeper below it than the second, give its error across.
+
+The sides of a head, of which a scanner sees one, are deeper. Points within the third give its error in height.
+"""
 
 PLACES = 20
 """Places that are evaluated by default."""
@@ -314,7 +316,7 @@ def draw(
 
 
 def compare(rails: Sequence[RailLine], heads: np.ndarray) -> tuple[int, int, float, np.ndarray, np.ndarray]:
-    """Compare lines with labelled points on heads, (n, 3); differences are those of `Result`."""
+    """Compare lines with labelled points on heads, (n, 3); differences are as in `Result`."""
     cells = np.floor(heads[:, :2] / CELL_M).astype(np.int64)
     count = len(np.unique(cells, axis=0))
     chords = cut([one.xyz for one in rails])

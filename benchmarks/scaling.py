@@ -60,7 +60,7 @@ POINTS_PER_M = 500
 """Rail points per metre of double track: 50 million on 100 km."""
 
 FEW_POINTS_PER_M = 100
-"""The same where points only show which squares there are."""
+"""The same where points only decide which squares there are."""
 
 TRACKS_AT_M = (0.0, 4.5)
 """Distances of the two tracks to the left of the first one."""
@@ -270,7 +270,7 @@ def laid_rails(source: SpooledPoints, square: Square, *_) -> SquareRails:
 
 
 def in_own_process(folder: Path, lines: str) -> dict:
-    """Measure in a separate process, because peak memory is that of a process."""
+    """Measure in a separate process, because peak memory belongs to a process."""
     words = [sys.executable, __file__, "--measure", str(folder), lines]
     run = subprocess.run(words, capture_output=True, text=True)
     if run.returncode:

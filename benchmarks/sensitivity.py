@@ -40,7 +40,7 @@ NOISES_M = (0.002, 0.004, 0.006, 0.008, 0.010)
 GAPS_M = (0.0, 0.5, 1.0, 2.0, 3.0, 4.0)
 RADII_M = (np.inf, 1200.0, 300.0, 100.0, 50.0, 25.0)
 SLOPES = (0.0, 1 / 200, 1 / 50, 1 / 9, 0.36, 1.0)
-"""Angles to the grid as rise over run: those of docs/method.md section 4.12, and the diagonal."""
+"""Angles to the grid as rise over run: from docs/method.md section 4.12, and the diagonal."""
 
 
 @dataclass(frozen=True)

@@ -106,7 +106,7 @@ CALLS = {
 
 @dataclass(frozen=True)
 class Spent:
-    """Seconds of a call on the clock, and those of all its processes on processors."""
+    """Seconds of a call on the clock, and of all its processes on processors."""
 
     wall_s: float
     cpu_s: float

@@ -1,4 +1,4 @@
-"""Processor time by stage: functions are wrapped, and the time of a stage is without that of the stages within it."""
+"""Processor time by stage: functions are wrapped, and a stage does not count the stages within it."""
 
 from __future__ import annotations
 

@@ -141,7 +141,7 @@ def _overview(axes: plt.Axes, world: World, judged: Judged) -> None:
 
 
 def _errors(axes: plt.Axes, world: World, judged: Judged) -> None:
-    """Draw the errors along the lines, with the standard errors that they state."""
+    """Draw the errors along the lines, with their standard errors."""
     if judged.found is None or not len(judged.found.line):
         return
     at, _ = _unrolled(world, cut(_lines(world, judged)).middle[:, :2])

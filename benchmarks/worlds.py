@@ -50,7 +50,7 @@ def main() -> None:
 
 
 def collect(seeds: Sequence[int], kind: str, folder: Path, jobs: int) -> list[Line]:
-    """Run the worlds that were not run by this code, append their lines to the file, and return those of all."""
+    """Run the worlds that were not run by this code, append their lines to the file, and return all lines."""
     path, code = folder / f"{kind}.jsonl", fingerprint()
     known = {line["seed"]: line for line in written(path) if line["version"] == VERSION and line["code"] == code}
     missing = [seed for seed in seeds if seed not in known]

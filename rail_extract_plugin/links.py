@@ -39,7 +39,7 @@ class _Links(QObject):
 
     @pyqtSlot(QUrl)
     def open(self, address: QUrl) -> None:
-        """Follow a link; those of an earlier session of the plugin lead nowhere."""
+        """Follow a link; links of an earlier session of the plugin lead nowhere."""
         call = self._calls.get(address.toString())
         if call is not None:
             call()

@@ -17,5 +17,5 @@ GUIDE = RESOURCES / "guide"
 
 
 def is_sample(path: str) -> bool:
-    """Return whether a path is that of the sample cloud, which shows what the plugin does and is nobody's survey."""
+    """Return whether a path leads to the sample cloud, a demonstration that is nobody's survey."""
     return bool(path) and SAMPLE in Path(path).resolve().parents

@@ -37,7 +37,7 @@ MENU = "Rail Extract"
 """Submenu of QGIS's menu of plugins."""
 
 TOOLBOX = "ProcessingToolbox"
-"""Name of the dock with the toolbox, of which that of the review is a tab."""
+"""Name of the dock with the toolbox; the review is a tab beside it."""
 
 
 class Windows(QObject):

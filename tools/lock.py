@@ -17,7 +17,7 @@ from pathlib import Path
 LOCKED = Path(__file__).resolve().parent.parent / "rail_extract_plugin" / "setup" / "locked.txt"
 
 PYTHONS = ("3.9", "3.10", "3.11", "3.12", "3.13", "3.14")
-"""From that of QGIS 3.22 to that of QGIS 4."""
+"""From QGIS 3.22 to QGIS 4."""
 
 SYSTEMS = {
     "win32-amd64": "x86_64-pc-windows-msvc",
@@ -35,7 +35,7 @@ OPTIONAL = ("torch",)
 """Not every system has a build of it for every Python."""
 
 MACOS = {REQUIREMENTS: "14.0", OPTIONAL: "12.0"}
-"""The oldest macOS: that of pyproj's builds for Intel, and one before the newest that PyTorch's newest builds need."""
+"""The oldest macOS: pyproj's builds for Intel need the first, older builds of PyTorch the second."""
 
 NOT_LOCKED = ("numpy",)
 """Of QGIS."""

@@ -15,17 +15,14 @@ from .ridges import EDGE_M, HALF_M, STATION_M, RidgeShape
 from .rounds import LONG, REACHES_M, TRACKS_APART_M, WIDE_M, Beside, Refined, Traced, look_beside, refine, strip_error
 from .search import Evidence, GuideCourse, certainty, courses, evidence, groups, slopes
 
-LONG_GAIN, LONG_SHARE = 7.0, 0.25
-"""Gain that two rails must have over 70 m, and the share of the expected gain: roads, hedges and ditches stay below."""
+LONG_GAIN = 7.0
+"""Gain that two rails must have over 70 m: roads, hedges and ditches stay below."""
 
 OWN_GAIN = 4.0
 """Gain with which a section shows a track by itself."""
 
 CHANCE = 1.5
 """Standard deviations by which the gain of a section may be below the expected gain E: noise changes it by √(2 E)."""
-
-WIDEST_M = 0.215
-"""Ridges this wide are the halves of a road's crown: no survey has the footprint of 0.7 m that would blur rails so."""
 
 RIVAL_SHARE = 1.1
 """Share of a line's score over 70 m that no place so close that it excludes the line may have."""
@@ -216,7 +213,6 @@ def _reasons(line: _Line, switch: np.ndarray) -> np.ndarray:
     own = sections.found.both > np.minimum(OWN_GAIN, most - CHANCE * np.sqrt(2 * most))
     own &= np.abs(sections.offset) < REACHES_M[-1] - EDGE_M
     shown, flat = _over_70_m(line.beside, switch) if line.beside is not None else (own, own)
-    flat &= refined.seen.shape.width_m < WIDEST_M
     half = np.minimum(np.arange(len(own)) * 2, len(line.sure) - 1)
     reason = np.full(len(own), SEEN)
     for code, holds in (
@@ -235,15 +231,13 @@ def _over_70_m(beside: Beside, switch: np.ndarray) -> tuple[np.ndarray, np.ndarr
 
     Of the 70 m before, around and behind a station, the best count: beside a train, those on its other side.
     """
-    gain, flaw, most = beside.on
-    least = np.maximum(LONG_GAIN, LONG_SHARE * most)
-    score = gain - flaw
+    gain, score = beside.on
     around = np.arange(len(gain)) + np.array([[-(LONG // 2)], [0], [LONG // 2]])
     around = np.clip(around, 0, len(gain) - 1)
     best = np.take_along_axis(around, score[around].argmax(axis=0)[None], axis=0)[0]
-    flat = (score > least) & (beside.rival < RIVAL_SHARE * score)
+    flat = (score > LONG_GAIN) & (beside.rival < RIVAL_SHARE * score)
     alone = beside.repeated < REPEATED_SHARE * score
-    return (gain > least)[best], flat[best] & (alone[best] | switch)
+    return (gain > LONG_GAIN)[best], flat[best] & (alone[best] | switch)
 
 
 JUMP_M = 1.0
@@ -283,9 +277,8 @@ def _places(lines: Iterable[_Line]) -> cKDTree:
     return cKDTree(np.concatenate([Polyline(line.refined.curve.xy).resampled(VERTEX_M).xy for line in lines]))
 
 
-OTHER_SHARE, OTHER_GAIN, CLAIMED_M = 0.5, 10.0, 1.2
-"""A place beside a track looks like another one with this share of its score and this gain over 70 m; it has a guide if
-a line passes this close."""
+OTHER_GAIN, CLAIMED_M = 10.0, 1.2
+"""A place beside a track looks like another one with this gain over 70 m; it has a guide if a line is this close."""
 
 
 def _unclaimed(number: int, lines: dict[int, _Line]) -> np.ndarray:
@@ -294,16 +287,16 @@ def _unclaimed(number: int, lines: dict[int, _Line]) -> np.ndarray:
     if line.beside is None:
         return np.empty((0, 2))
     known = _places(lines.values())
-    gain, flaw, _ = line.beside.on
+    on = line.beside.on[1]
     found = []
-    for section in range(min(LONG // 2, len(gain) - 1), len(gain), LONG):
-        t, own, score = float(line.refined.t[section]), gain[section] - flaw[section], line.beside.score[section]
+    for section in range(min(LONG // 2, len(on) - 1), len(on), LONG):
+        t, own, score = float(line.refined.t[section]), on[section], line.beside.score[section]
         for side in (-1, 1):
             there = np.where(side * line.beside.across > TRACKS_APART_M, score, -np.inf)
             best = int(there.argmax())
             at, across = np.array([t]), line.beside.across[best]
             place = line.refined.line.at(at) + across * line.refined.line.left_at(at)
             free = known.query(place)[0][0] > CLAIMED_M
-            if own > OTHER_GAIN and there[best] > max(OTHER_GAIN, OTHER_SHARE * own) and free:
+            if min(own, there[best]) > OTHER_GAIN and free:
                 found.append((t, float(across)))
     return np.array(found).reshape(-1, 2)

@@ -59,13 +59,12 @@ SHIFT_LENGTH_M, STRIP_SHIFT_M = 50.0, 0.1
 class Beside:
     """Places `across`, (c,), to the left of a line and on it, for the `LONG` sections around each section.
 
-    `gain`, `flaw` and `most`, (n, c), are those of `ridges.RidgeFit`.
+    `gain` and `flaw`, (n, c), are those of `ridges.RidgeFit`.
     """
 
     across: np.ndarray
     gain: np.ndarray
     flaw: np.ndarray
-    most: np.ndarray
 
     @property
     def score(self) -> np.ndarray:
@@ -73,10 +72,10 @@ class Beside:
         return self.gain - self.flaw
 
     @property
-    def on(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Gain, flaw and expected gain on the line, (n,) each."""
+    def on(self) -> tuple[np.ndarray, np.ndarray]:
+        """Gain and score on the line, (n,) each."""
         middle = len(self.across) // 2
-        return self.gain[:, middle], self.flaw[:, middle], self.most[:, middle]
+        return self.gain[:, middle], self.score[:, middle]
 
     @property
     def rival(self) -> np.ndarray:
@@ -112,7 +111,7 @@ def look_beside(corridor: Corridor, shape: RidgeShape, sections: int) -> Beside:
     u = (np.arange(width) - half) * STEP_M
     long = replace(shape, rough_m=shape.rough_m / np.sqrt(LONG))
     found = fit(windows(count, width), windows(height, width), u, long, passes=3)
-    return Beside((np.arange(places) - places // 2) * STEP_M, found.gain, found.flaw, found.most)
+    return Beside((np.arange(places) - places // 2) * STEP_M, found.gain, found.flaw)
 
 
 def _around(values: np.ndarray) -> np.ndarray:

@@ -38,10 +38,8 @@ def whole_heads(tops: Tops, kept: np.ndarray, tolerances: Tolerances) -> np.ndar
 
     Parameters
     ----------
-    tops : Tops
     kept : (k,) int array
         One cell of each block.
-    tolerances : Tolerances
 
     Returns
     -------
@@ -85,12 +83,10 @@ def label(tops: Tops, heads: np.ndarray, cell: np.ndarray, height: np.ndarray, t
 
     Parameters
     ----------
-    tops : Tops
     heads : (m,) int array
         Cells of railheads.
     cell, height : (n,) arrays
         Cell of each point and its height above the bed.
-    tolerances : Tolerances
     """
     if not len(heads):
         return np.empty(0, dtype=np.int64)

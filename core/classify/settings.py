@@ -111,7 +111,6 @@ class Settings:
     ----------
     gauges_m : tuple of float
         Gauges to pair rails by; the first one sets the size of the cells.
-    head_width_m : float
     keep_single : bool
         Whether straight rails of some length without a partner are kept.
     guide : Guide, optional

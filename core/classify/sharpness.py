@@ -47,20 +47,7 @@ def is_decided(seen: SearchFigures) -> bool:
 
 
 def search_alike(parts: Sequence[Part], search: Callable[[Sequence[Part], bool], Iterable[Answer]]) -> Iterator[Answer]:
-    """Search all parts of a cloud in the way that suits it.
-
-    Parameters
-    ----------
-    parts : sequence
-        Those that show most first.
-    search : callable
-        Searches parts of a sharp cloud, or of a blunt one.
-
-    Yields
-    ------
-    Answer
-        For each part.
-    """
+    """Search all parts of a cloud, those that show most first, in the way that suits it: as a sharp or a blunt one."""
     seen, done = SearchFigures(), 0
     found: list[Answer] = []
     while done < len(parts) and not is_decided(seen):

@@ -183,14 +183,7 @@ def _seen_at(xy: np.ndarray, points: np.ndarray) -> tuple[Places, np.ndarray, fl
 def _crowns(place: np.ndarray, across: np.ndarray, z: np.ndarray, places: int) -> np.ndarray:
     """Return the heights of the crowns of places, (p,) metres: the highest part of a rail that is as narrow as a head.
 
-    Parameters
-    ----------
-    place : (n,) int array
-        Place to which each point belongs.
-    across, z : (n,) arrays
-        Offsets of the points across the rail, and their heights.
-    places : int
-        Number of places.
+    Points are given by their place, offset across the rail and height, (n,) each.
     """
     order = np.lexsort((z, place))
     place, across, z = place[order], across[order], z[order]

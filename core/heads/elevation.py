@@ -54,8 +54,6 @@ class ElevationParameters:
         Maximum depth of a point below the top surface.
     crown_radius_m : float
         Radius of the disc that rolls along the top.
-    smoothing_z_m : float or None
-        See `Parameters`.
     cell_m : float
         Cell size of the raster from which the line was drawn.
     min_length_m : float
@@ -81,24 +79,10 @@ def elevate(
     progress: Progress = SILENT,
     strips: Sequence[StripOffsets | None] = (),
 ) -> tuple[RailLine, ...]:
-    """Add heights and figures to the smoothed plan lines of a network.
+    """Add heights and figures to the smoothed plan lines of a network, which still meet where they meet in a node.
 
-    Parameters
-    ----------
-    network : LineNetwork
-        Smoothed lines; lines that meet in a node still meet there.
-    near : sequence of HeadPoints
-        Points of each line.
-    class_code : int
-    parameters : ElevationParameters
-    progress : Progress
-    strips : sequence of StripOffsets or None
-        For each line; empty if the points are of one strip.
-
-    Returns
-    -------
-    tuple of RailLine
-        In order of their starts from west to east, numbered from 1; without lines that are short or have no points.
+    Points and offsets of the strips are given by line; offsets are empty if the points are of one strip. The rails are
+    numbered from 1 in order of their starts from west to east; those that are short or have no points are left out.
     """
     free_ends = (network.degrees() == 1)[network.ends]
     rails = []
@@ -110,16 +94,10 @@ def elevate(
 
 
 def begun_on_others(rails: Sequence[RailLine], reach_m: float) -> list[RailLine]:
-    """Give ends that no points show the height of the rail on which they begin.
+    """Give ends that no points show the height of the rail on whose head they begin, within `reach_m` of it.
 
     A branch begins on its stock rail, on the same sleepers. Where points show neither blade nor frog, its heights would
     be extrapolated for up to 10 m; the grade where its points begin stays as it is.
-
-    Parameters
-    ----------
-    rails : sequence of RailLine
-    reach_m : float
-        Distance of an end from a rail within which it is on its head.
     """
     level = []
     for rail in rails:
@@ -145,19 +123,7 @@ def _begun_on(others: Sequence[RailLine], rail: RailLine, reach_m: float) -> Rai
 
 
 def flat_rails(network: LineNetwork, class_code: int, parameters: ElevationParameters) -> tuple[RailLine, ...]:
-    """Make rails without heights from the lines of a network.
-
-    Parameters
-    ----------
-    network : LineNetwork
-    class_code : int
-    parameters : ElevationParameters
-
-    Returns
-    -------
-    tuple of RailLine
-        As from `elevate`, but with heights of NaN and figures of support of 0 or NaN.
-    """
+    """Make rails as from `elevate`, but with heights of NaN and figures of support of 0 or NaN."""
     rails = (flat_rail(line, class_code) for line in network.lines)
     return numbered([rail for rail in rails if rail.length_m >= parameters.min_length_m])
 
@@ -229,20 +195,7 @@ def measure_again(
 ) -> list[RailLine]:
     """Measure heights, as far as the points show them, and the support of finished rails, which may come from files.
 
-    Parameters
-    ----------
-    rails : sequence of RailLine
-    points : RailPoints
-    head_width_m : float or (n,) array
-        Width of the heads, of all rails or of each.
-    progress : Progress
-    align : bool
-        See `ElevationParameters`.
-
-    Returns
-    -------
-    list of RailLine
-        In the order given. A rail without points keeps its heights and is a gap from end to end.
+    Returns rails in the order given; one without points keeps its heights and is a gap from end to end.
     """
     plans = [rail.line.resampled(KNOT_M).xy for rail in rails]
     near = near_lines(plans, points.xyz, head_width_m, points.strips, progress.span(0.0, 0.7), points.blunt)
@@ -289,21 +242,9 @@ def _supported(t: np.ndarray, length_m: float, free_ends: np.ndarray) -> tuple[f
 
 
 def find_gaps(t: np.ndarray, start: float, end: float) -> np.ndarray:
-    """Find the gaps between the points of a line: longer than MIN_GAP_M, and than chance makes them.
+    """Find the gaps, (k, 2), between points at chainages `t`, (n,): longer than MIN_GAP_M, and than chance makes them.
 
     Of n points per metre at random places, n exp(-n g) per metre are followed by a gap longer than g.
-
-    Parameters
-    ----------
-    t : (n,) array
-        Chainages of the points.
-    start, end : float
-        Chainages of the ends of the line.
-
-    Returns
-    -------
-    (k, 2) array
-        Start and end of each gap.
     """
     borders = np.concatenate([[start], np.clip(np.sort(t), start, end), [end]])
     per_m = _points_per_m(np.diff(borders))

@@ -40,28 +40,11 @@ def refine(
     align: bool = False,
     cell_m: float = CELL_M,
 ) -> LineNetwork:
-    """Move smoothed lines onto the axes of their railheads.
+    """Move smoothed lines, within 3 cm of their rails, onto the axes of their railheads.
 
-    Parameters
-    ----------
-    network : LineNetwork
-        Smoothed lines within 3 cm of their rails.
-    points : RailPoints
-    head_width_m : float or (n,) array
-        Width of the heads, of all lines or of each.
-    smoothing_m : float
-        Length over which what moves a node fades along its lines.
-    progress : Progress
-    align : bool
-        Whether the strips of the points are moved onto their mean.
-    cell_m : float
-        Cell size of the raster from which the lines were drawn.
-
-    Returns
-    -------
-    LineNetwork
-        Lines stay as they are where points show no edge of a head. Lines that met in a node still do, and branches
-        begin where they touch the rail that they leave.
+    What moves a node fades along its lines over `smoothing_m`; `align` moves the strips of the points onto their mean,
+    and `cell_m` is that of the raster from which the lines were drawn. Lines stay as they are where points show no edge
+    of a head. Lines that met in a node still do, and branches begin where they touch the rail that they leave.
     """
     by_x = points.xyz[np.argsort(points.xyz[:, 0])] if len(network.passes) else points.xyz
     shares = progress.split(ROUNDS + (ALIGNED_ROUNDS if align and points.strips is not None else 0))

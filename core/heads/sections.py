@@ -156,14 +156,7 @@ class Middles:
 
 
 def outline_middles(points: HeadPoints, seen: np.ndarray) -> Middles:
-    """Find the middle of the head from its outline, at the stations of a line that is on the head.
-
-    Parameters
-    ----------
-    points : HeadPoints
-    seen : (s,) bool array
-        Where the head stands alone.
-    """
+    """Find the middle of the head from its outline where it stands alone, `seen` (s,); the line is on the head."""
     count, head_width_m = len(seen), points.width_m
     middles = Middles.unknown(count)
     left, up, level = points.in_frame()
@@ -299,17 +292,9 @@ def _blur(section: Section, wider_m: float, offset: np.ndarray, apart_up_m: floa
 
 
 def likelier_width(lines: Sequence[np.ndarray], xyz: np.ndarray, widths_m: Sequence[float]) -> float:
-    """Return which of several widths of heads explains points best, metres; the first if they do not show it.
+    """Return which of several widths of heads explains points, (n, 3), on rails best, metres; the first if none does.
 
     Other than the spread of the points, this does not depend on their noise and on how much of the faces is classified.
-
-    Parameters
-    ----------
-    lines : sequence of (k, 2) arrays
-        Rails in plan.
-    xyz : (n, 3) array
-        Points.
-    widths_m : sequence of float
     """
     grid, outlines = Grid.of(max(widths_m)), [Outline.of(width_m) for width_m in widths_m]
     likelihood = np.zeros(len(widths_m))
@@ -340,15 +325,9 @@ def _borders(station: np.ndarray, count: int) -> list[tuple[int, int]]:
 def _pull(station: np.ndarray, is_left: np.ndarray, count: int) -> np.ndarray:
     """Return how far middles of a section are pulled to the left because the view changes along it, (count,) metres.
 
-    A branch leaves the track that the scanner is on: it is seen from above first, then from the side. What the whole
-    section shows on average pulls its beginning to one side and its end to the other.
-
-    Parameters
-    ----------
-    station, is_left : (n,) int and bool arrays
-        Station of each point, ascending, and whether the point is to the left of the axis.
-    count : int
-        Number of stations.
+    `station`, ascending, and `is_left` of the axis are those of each point. A branch leaves the track that the scanner
+    is on: it is seen from above first, then from the side. What the whole section shows on average pulls its beginning
+    to one side and its end to the other.
     """
     half = int(np.searchsorted(station, count // 2))
     if not 0 < half < len(station):
@@ -376,7 +355,6 @@ def _by_station(
     ----------
     place : (2,) array
         Offset and height of the section.
-    scores : Scores
     bins, station : (n,) int arrays
         Bin and station of each point.
     count : int

@@ -80,7 +80,7 @@ def _copy(first: Path, path: Path, shift: np.ndarray, octree: bool) -> None:
 
 
 def _guides(count: int) -> list[np.ndarray]:
-    """Return lines along the tracks of all rows, relative to `ORIGIN`, whose vertices are off as those of maps are."""
+    """Return lines along the tracks of all rows, relative to `ORIGIN`, whose vertices are off as in maps."""
     rng = np.random.RandomState(count)
     guides = []
     for row in range(-(-count // COLUMNS)):

@@ -23,7 +23,7 @@ GROUND = 2
 
 
 def las_of(cloud: AirborneCloud, class_code: int = GROUND, frame: LocalFrame = FRAME) -> laspy.LasData:
-    """Return a cloud as LAS 1.4, with a source id for each strip; the zero of the cloud is that of the frame."""
+    """Return a cloud as LAS 1.4, with a source id for each strip; the cloud has the zero of the frame."""
     xyz, crs, strips = frame.to_crs(cloud.xyz), str(frame.crs_wkt), cloud.strip + 1
     return las_data(xyz, crs, offsets=frame.origin, classification=class_code, point_source_id=strips)
 

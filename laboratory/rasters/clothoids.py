@@ -23,7 +23,7 @@ MAX_DEFLECTION_DEG, GRID_DEG = 70.0, 2.0
 """Range and step of the deflections in the table; beyond this range curves turn back on themselves."""
 
 MAX_LENGTH_CHORDS = 2.0
-"""Length, in chords, from which a combination is a detour."""
+"""A combination longer than this, in chords, is a detour."""
 
 TABLE_STEPS, POLISH_STEPS = 8, 2
 UNSOLVED = 1e6

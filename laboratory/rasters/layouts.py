@@ -161,7 +161,7 @@ def yard(rng: np.random.Generator, size: TrackSize) -> Layout:
 
 
 def dual_gauge(rng: np.random.Generator, size: TrackSize) -> Layout:
-    """Lay one track with a third rail for a second gauge; either gauge may be that of `size`."""
+    """Lay one track with a third rail for a second gauge; either gauge may be the one of `size`."""
     axis = random_alignment(rng, 2 * MIN_RADIUS_M)
     third = beside(axis, _third_rail_offset(rng, size), 0)
     both = track(axis, size, spot=True)

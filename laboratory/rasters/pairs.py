@@ -12,7 +12,7 @@ from .layouts import RARE_FAMILIES, random_layout
 from .paths import TrackSize
 
 SPACING_M = 1.5112
-"""Distance between railhead centres in all layouts: that of 132RE."""
+"""Distance between railhead centres in all layouts, as of 132RE."""
 CELL_M = 0.04
 
 RATIOS = (14.2, 25.2)

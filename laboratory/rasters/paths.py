@@ -18,7 +18,7 @@ NO_TRACK = -1
 
 @dataclass(frozen=True)
 class TrackSize:
-    """The dimensions of a track in plan; the spacing is that of the two railhead centres."""
+    """The dimensions of a track in plan; the spacing is the distance between the two railhead centres."""
 
     spacing_m: float
     head_width_m: float

@@ -17,7 +17,7 @@ HEEL_SPREAD_M = 6.0 / 12 * FOOT_M
 """Divergence of an American switch rail over its length."""
 
 BLADE_START = (0.2, 0.4)
-"""Share of a switch blade's length from which it shows as a rail of its own; before, it is thinner than the noise."""
+"""Share of a switch blade's length after which it is a rail of its own; before, it is thinner than the noise."""
 BLADE_LENGTH_M = (5.0, 12.0)
 
 

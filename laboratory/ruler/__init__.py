@@ -1,1 +1,1 @@
-"""The ruler: it compares extracted lines and tracks with the truth, next to those of a plain script."""
+"""The ruler: it compares extracted lines and tracks, and the lines of a plain script, with the truth."""

@@ -1,4 +1,4 @@
-"""Measurement of one scene: our lines and those of a plain script, compared with the truth."""
+"""Measurement of one scene: our lines, and the lines of a plain script, compared with the truth."""
 
 from __future__ import annotations
 

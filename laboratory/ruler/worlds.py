@@ -38,10 +38,10 @@ NEAR_M = 0.05
 """Distance in plan within which a line is on a rail."""
 
 BIN_M, END_M = 1.0, 3.0
-"""Length of rail over which points are counted, and length at both ends of what the cloud shows that is left out."""
+"""Length of rail over which points are counted, and length that is left out at both ends of a rail in the cloud."""
 
 BREAK_M = 2 * Parameters.max_gap_m
-"""Length of rail that the cloud hardly shows in which its line may end once: what is bridged, on either side."""
+"""Length of rail with hardly any points in which its line may end once: what is bridged, on either side."""
 
 FALSE_M = 3.0
 """Greatest length of lines that are on no rail."""

@@ -14,7 +14,7 @@ from laspy._compression import lazrsbackend
 from ...core.clouds import laz
 
 INFO_BYTES, ENTRY_BYTES, RECORD_HEADER_BYTES, LATE_HEADER_BYTES = 160, 32, 54, 60
-"""Sizes of the record that states the octree, of an entry of it, and of the headers of records."""
+"""Bytes of the record that describes the octree, of an entry in it, and of the headers of records."""
 
 
 def write_copc(cloud: laspy.LasData, path: Path, low: np.ndarray, side_m: float, levels: int) -> tuple[int, int]:

@@ -12,7 +12,7 @@ from ...core.clouds.crs import parse_crs
 from ...core.clouds.las import laspy
 
 SCALE_M = 0.001
-"""Resolution of the coordinates in the file: a millimetre, as that of scanners."""
+"""Resolution of the coordinates in the file: a millimetre, as scanners have."""
 
 MADE = date(2025, 1, 1)
 """Date in the header of the file, fixed so that the same scene gives the same file."""

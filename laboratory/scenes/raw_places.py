@@ -46,7 +46,7 @@ MARKINGS_M, MARKING_M = ((1.0, 0.15, 18.0), (4.75, 0.15, 6.0), (8.5, 0.30, 18.0)
 """Distance of the markings from the middle, width and length of a dash; distance of the dashes, and thickness."""
 
 RUMBLE_M, RUMBLE_STEP_M = (8.9, 0.30, 0.18, 0.012), 0.40
-"""Rumble strip: distance of its middle from that of the motorway, and width, length and depth of its grooves."""
+"""Rumble strip: its distance from the middle of the motorway, and width, length and depth of its grooves."""
 
 KERB_M = 0.12
 """Width of a kerbstone and its height above the road."""
@@ -66,7 +66,7 @@ POTATOES_M = (8.5 * RIDGE_STEP_M, 24.5 * RIDGE_STEP_M)
 
 
 def places(world: World, *edges: np.ndarray) -> np.ndarray:
-    """Places across a world, (m,), with those of edges among them."""
+    """Places across a world, (m,), the edges among them."""
     even = np.arange(-world.half_width_m, world.half_width_m + ACROSS_STEP_M, ACROSS_STEP_M)
     return np.unique(np.concatenate([even, *edges]))
 

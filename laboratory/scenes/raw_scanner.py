@@ -81,7 +81,7 @@ class RawScanner:
         return station[station < length_m]
 
     def share_kept(self, ahead_m: np.ndarray, reach_m: np.ndarray) -> np.ndarray:
-        """Share of points, (n,), that a scanner on a tripod has of those of dense profiles.
+        """Share of the points of dense profiles, (n,), that a scanner on a tripod has.
 
         On any surface along the line, rays of a sphere are `reach_m`² / distance³ · profile_step / ray_step as dense as
         those of the profiles: the solid angle falls with the square of the distance, and the cosine with it. `ahead_m`

@@ -41,7 +41,7 @@ NEW = Profile()
 
 @dataclass(frozen=True)
 class Scanner:
-    """A scanner on a train; the defaults are those of a good one.
+    """A scanner on a train, by default a good one.
 
     Attributes
     ----------
@@ -72,7 +72,7 @@ class Scanner:
 
 
 def head_outline(head_width_m: float, profile: Profile = NEW) -> tuple[np.ndarray, np.ndarray]:
-    """Return the outline of a railhead in its own frame, from the bottom of the left face to that of the right one.
+    """Return the outline of a railhead in its own frame, from the bottom of the left face over the top to the right.
 
     Places, (m, 2), are metres to the left of the axis and above the top, 0 or negative; the angle between the normal of
     the surface and the axis, (m,), is in radians and positive to the left.

@@ -33,8 +33,7 @@ FLAT = Profile(crown_radius_m=20.0, corner_radius_m=0.002)
 """A head without a crown, as profiles are that software draws."""
 
 RIDGE_M, RIDGE_SPREAD_M, RIDGE_REACH_M, RIDGE_PER_M = 0.12, 0.05, 0.075, 400
-"""Height, spread and half the width of the ridge by which dense matching of photographs shows a rail, and its points
-per metre."""
+"""A rail in the dense matching of photographs is a ridge: its height, spread, half width, and points per metre."""
 
 RIDGE_NOISE_M, RIDGE_WANDER_M, RIDGE_WANDER_LENGTH_M = 0.004, 0.004, 6.0
 """Noise of its points, and standard deviation and length of the errors that neighbouring points share."""

@@ -52,7 +52,7 @@ def write_raw(scene: RawScene, path: Path) -> None:
 
 
 def _write(scene: Scene | RawScene, path: Path, point_format: int, values: dict[str, Any]) -> None:
-    """Write points with those of the values that are known."""
+    """Write points with the values that are known."""
     known = {name: value for name, value in values.items() if value is not None}
     xyz, crs, offsets = scene.frame.to_crs(scene.xyz), scene.frame.crs_wkt, scene.frame.origin
     write_las(path, xyz, crs, offsets=offsets, version="1.4", point_format=point_format, **known)

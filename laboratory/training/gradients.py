@@ -128,7 +128,7 @@ class CpuBatchNorm2d(PassBatchNorm2d):
 
 
 class _Rectifier(torch.autograd.Function):
-    """ReLU with a vectorized gradient in bfloat16: that of leaky ReLU with a slope of 0."""
+    """ReLU with a vectorized gradient in bfloat16, as leaky ReLU with a slope of 0 has."""
 
     @staticmethod
     def forward(ctx, x: Tensor) -> Tensor:
@@ -152,7 +152,7 @@ class CpuReLU(nn.ReLU):
 
 
 def train_on_cpu(network: nn.Module) -> None:
-    """Replace the layers of a network by those of this module, in place; the parameters remain the same."""
+    """Put the layers of this module in place of a network's own; the parameters remain the same."""
     for module in network.modules():
         if type(module) is nn.ReLU:
             module.__class__ = CpuReLU

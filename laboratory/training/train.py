@@ -59,7 +59,7 @@ the bias."""
 LOGIT_BIN, MAX_LOGIT = 0.05, 8.0
 """Step and range of the search for the bias: a step changes F1 by less than 0.0005."""
 DATA, STATISTICS_DATA, CALIBRATION_DATA = 0, 1, 2
-"""Streams of random numbers, different from those of evaluation."""
+"""Streams of random numbers; evaluation uses others."""
 
 
 @dataclass(frozen=True)

@@ -410,7 +410,7 @@ def _spare_rail(built: _Built, name: str) -> None:
 
 
 def _train(built: _Built, name: str) -> None:
-    """Park wagons on a track other than that of the scanner, where no other track is too close."""
+    """Park wagons on a track that the scanner does not ride, where no other track is too close."""
     start = built.rng.uniform(-5.0, built.length_m * 0.6)
     end = start + built.rng.randint(1, 4) * things.WAGON_M
     there = (built.station > start - 1.0) & (built.station < end + 1.0)

@@ -26,8 +26,11 @@ MAX_POINTS = 1_400_000
 """About the number of points above which a survey is made with wider steps."""
 
 MAX_STEPS = 2.2e-4
-"""Greatest product of the distance of profiles, in metres, and that of rays, in radians: 100 points per metre of a head
-7 cm wide at 3 m, of all passes together. A scanner beside the tracks is further away."""
+"""Greatest product of the step between profiles, metres, and the step between rays, radians.
+
+It gives 100 points per metre of a head 7 cm wide at 3 m, of all passes together. A scanner beside the tracks is further
+away.
+"""
 
 DOWN_SHARE = 0.62
 """About the share of the rays of a full turn that hit something within the width of a world."""
@@ -132,7 +135,7 @@ def _mobile(
 
 
 def _apart(rng: np.random.RandomState, count: int, most_m: float = APART_M) -> np.ndarray:
-    """Draw the errors of passes, to the left and up, (count, 2) metres; their mean is 0, as that of the truth is."""
+    """Draw the errors of passes, to the left and up, (count, 2) metres; their mean is 0, as the truth has no error."""
     if count == 1:
         return np.zeros((1, 2))
     size_m = even_in_log(rng, 0.001, most_m) if maybe(rng, 0.7) else 0.0
@@ -206,7 +209,7 @@ def _camera(rng: np.random.RandomState, area_m2: float) -> Photogrammetry:
 
 
 def marked(scene: RawScene, survey: Survey, reference: Curve) -> RawScene:
-    """Give the points of a scene the ids and times of their passes, as far as the survey states them."""
+    """Give the points of a scene the ids and times of their passes, as far as the survey has them."""
     passes = np.asarray(scene.passes, dtype=np.uint16)
     times = np.zeros(len(passes))
     if survey.has_times:

@@ -1,4 +1,4 @@
-"""The algorithms of the toolbox: one for each job of the core, and those of the setup."""
+"""The algorithms of the toolbox: one for each job of the core, and two for the setup."""
 
 from __future__ import annotations
 

@@ -49,6 +49,6 @@ def explain_invalid(
 
 
 def _is_no_number(definition: QgsProcessingParameterDefinition, given: Any) -> bool:
-    """Return whether a text is given for a number: QGIS leaves out that of an optional one without a word."""
+    """Return whether a text is given for a number: for an optional number, QGIS drops it without a word."""
     number = number_in(given) if isinstance(given, str) else None
     return isinstance(definition, QgsProcessingParameterNumber) and number is not None and math.isnan(number)

@@ -99,7 +99,7 @@ class ParameterValues(Values):
         prepare_system(crs_wkt)
 
     def path(self, name: str) -> Path:
-        """Return the file that an output names; QGIS chooses that of a temporary one during the run."""
+        """Return the file that an output names; QGIS chooses a temporary one during the run."""
         return Path(self.output_file(name))
 
     def destination(self, name: str) -> Destination:

@@ -301,7 +301,7 @@ class GrowRails(QObject):
             self._seed_layer_id = ""
 
     def _seed_layer(self) -> QgsVectorLayer:
-        """Return a layer of the project with the seeds: that of a dialog that has not run with it, or a new one."""
+        """Return a layer of the project with the seeds: the one of a dialog that has not run yet, or a new one."""
         layer = QgsProject.instance().mapLayer(self._seed_layer_id)
         if layer is None:
             layer = QgsProject.instance().addMapLayer(QgsVectorLayer("Point", "Rail seeds", "memory"))

@@ -65,7 +65,7 @@ def _system_name(crs: QgsCoordinateReferenceSystem) -> str:
 
 @contextmanager
 def points_folder() -> Iterator[Path]:
-    """Create a temporary folder for the points of a run, next to that of QGIS, and remove those of killed runs."""
+    """Create a temporary folder for the points of a run, next to QGIS's own, and remove what killed runs left."""
     parent = Path(QgsProcessingUtils.tempFolder()).parent
     sweep(parent)
     with scratch_folder(parent) as folder:

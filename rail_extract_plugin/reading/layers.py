@@ -134,7 +134,7 @@ def read_place(
     crs: QgsCoordinateReferenceSystem,
     context: QgsProcessingContext,
 ) -> np.ndarray:
-    """Return a place in the coordinate system of the cloud, (1, 2); `own` is that of the place.
+    """Return a place in the coordinate system of the cloud, (1, 2), from its `own` system.
 
     Raises CrsError if it can't be transformed.
     """
@@ -179,7 +179,7 @@ def _straighten(shape: QgsGeometry, chord: float) -> None:
 
 
 def _parts(shape: QgsGeometry, chord: float) -> list[tuple[str, np.ndarray]]:
-    """Return kind and vertices, (n, 4), of each part; those of a polygon are on its outer ring."""
+    """Return kind and vertices, (n, 4), of each part; of a polygon, the outer ring."""
     if shape.isNull():
         return []
     _straighten(shape, chord)

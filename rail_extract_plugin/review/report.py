@@ -18,7 +18,7 @@ SINGLE_RUN, BATCH = "AlgorithmDialog", "BatchAlgorithmDialog"
 
 
 class ReportOpener(QObject):
-    """Opens reports in the web browser; not those of a batch, of scripts, or if the user does not want it."""
+    """Opens reports in the web browser, except in a batch, in scripts, or if the user does not want it."""
 
     def register(self) -> None:
         """Show the setting and wait for reports."""

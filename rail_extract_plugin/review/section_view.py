@@ -30,7 +30,7 @@ MARK_PX = 7.0
 """Radius of the ring around the worst place."""
 
 HEAD_M = 0.04
-"""Height of the outline of a head without points: about that of the heads of all profiles."""
+"""Height of the outline of a head without points: about as high as heads of all profiles."""
 
 HEADS, HEADS_HIGH = 3.0, 1.6
 """Width and height of an enlarged head in head widths at least, so that points next to it are seen, too."""

@@ -41,7 +41,7 @@ STEP_M = 0.1
 
 @dataclass(frozen=True)
 class Gap:
-    """A part of a finding in which one rail has no points: its side, and chainages like those of the finding."""
+    """A part of a finding in which one rail has no points: its side, and chainages as in the finding."""
 
     side: str
     start_m: float
@@ -213,7 +213,7 @@ class ReadingTask(QgsTask):
 
 
 def _level(rails: np.ndarray, points: np.ndarray | None) -> float:
-    """Return the height of the middle of the picture: that of the rails or, without heights, of the points."""
+    """Return the height of the middle of the picture: the rails' or, without heights, the points'."""
     for heights in (rails[:, 1], np.empty(0) if points is None else points[:, 1]):
         if np.isfinite(heights).any():
             return float(np.nanmedian(heights))

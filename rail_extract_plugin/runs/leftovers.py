@@ -38,7 +38,7 @@ class Leftovers(QObject):
         self.clear()
 
     def _note(self, frame: FrameType) -> None:
-        """Keep the function that a run failed in, and those of the dialog that called it."""
+        """Keep the function that a run failed in, and the functions of the dialog that called it."""
         self._frames += _of_dialog(frame)
         self._timer.start(INTERVAL_MS)
 

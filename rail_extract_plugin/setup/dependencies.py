@@ -1,4 +1,4 @@
-"""The Python packages that Rail Extract needs in addition to those of QGIS, and what to do if some are missing."""
+"""The Python packages that Rail Extract needs and QGIS does not bring, and what to do if some are missing."""
 
 from __future__ import annotations
 

@@ -56,7 +56,7 @@ def move_to(layers: Sequence[QgsVectorLayer], path: Path) -> None:
 
 
 def _tables(layers: Sequence[QgsVectorLayer]) -> dict[str, str]:
-    """Return the name of the table of each layer, by its id: that of its output, without the cloud."""
+    """Return the name of the table of each layer, by its id: the name of its output, without the cloud."""
     tables: dict[str, str] = {}
     for layer in layers:
         name = layer.name().partition(":")[0].strip().lower().replace(" ", "_")

@@ -58,7 +58,7 @@ def fields(columns: Sequence[Field]) -> QgsFields:
 
 
 def features(layer: Layer, frame: LocalFrame) -> Iterator[QgsFeature]:
-    """Convert the features of a layer to those of QGIS, in the cloud's coordinates."""
+    """Convert the features of a layer to QGIS features, in the cloud's coordinates."""
     make = _line if layer.product.is_line else _point
     for places, xyz, *row in zip(layer.places(frame), layer.xyz, *layer.written_columns()):
         feature = QgsFeature()

@@ -101,7 +101,7 @@ def cloud_of(layer: QgsMapLayer) -> RunCloud | None:
 
 
 def name_run(layer: QgsMapLayer, title: str) -> str:
-    """Return the name of the run that made a layer, that of its algorithm and input; empty if the layer states none.
+    """Return the name of the run that made a layer, from its algorithm and input; empty if the layer has none.
 
     Runs of the same algorithm and input are numbered from the second on. A layer that is called by its title gets the
     name of the input as well; others, such as those of files, are called as the user wants.

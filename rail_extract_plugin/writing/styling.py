@@ -100,7 +100,7 @@ def _put_into_group(layer: QgsMapLayer, run: str) -> None:
 
 
 def _place_in(group: QgsLayerTreeGroup, layer: QgsMapLayer) -> int:
-    """Return the place of a layer among those of a group, by their styles."""
+    """Return the place of a layer in a group, by the styles of its layers."""
     ranks = {style: number for number, style in enumerate(TOP_TO_BOTTOM)}
     children = group.children()
     loaded = [one.layer() if QgsLayerTree.isLayer(one) else None for one in children]

@@ -10,7 +10,7 @@ from qgis.PyQt.QtGui import QColor
 from .. import compat
 
 COLORS = {"rails": "#1565c0", "centerlines": "#e64a19", "findings": "#d62839"}
-"""Colour of the lines by style, that of most of them in the map."""
+"""Colour of the lines by style, as most of them have it in the map."""
 
 WIDTHS_PX = {"rails": 3.0, "centerlines": 2.0, "findings": 6.0}
 """Width on the screen by style: lines as wide as a railhead disappear a few tens of metres away."""

@@ -20,7 +20,7 @@ from rail_extract.laboratory.scenes.las import write_las
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 
-from qgis.core import QgsApplication, QgsProcessingContext, QgsProcessingFeedback, QgsProject  # noqa: E402
+from qgis.core import NULL, QgsApplication, QgsProcessingContext, QgsProcessingFeedback, QgsProject  # noqa: E402
 
 EXTRACT_RAILS = "railextract:extractrails"
 ROOT = Path(__file__).resolve().parents[2]
@@ -137,6 +137,22 @@ def run_step(qgis, plugin, context):
             return Outcome(False, error=message)
         results, ok = algorithm.run(parameters, context, feedback)
         return Outcome(ok, results, "\n".join(feedback.errors))
+
+    return run
+
+
+@pytest.fixture
+def run_table(run_step, context, new_feedback):
+    """Run an algorithm whose OUTPUT is a layer; returns results, layer, values by field, and what was said."""
+
+    def run(name, feedback=None, **parameters):
+        feedback = feedback or new_feedback()
+        outcome = run_step(name, {"OUTPUT": "memory:", **parameters}, feedback)
+        assert outcome.ok, outcome.error
+        layer = context.getMapLayer(outcome.results["OUTPUT"])
+        rows = [[None if value == NULL else value for value in one.attributes()] for one in layer.getFeatures()]
+        values = {field: [row[at] for row in rows] for at, field in enumerate(layer.fields().names())}
+        return outcome.results, layer, values, feedback
 
     return run
 

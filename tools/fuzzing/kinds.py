@@ -93,7 +93,7 @@ def _make_spool(folder: Path) -> list[Path]:
 
 
 def _read_spool(path: Path) -> None:
-    """Continue with the damaged folder of an earlier run: the result must be that of a new folder."""
+    """Continue with the damaged folder of an earlier run: the result must be the same as with a new folder."""
     work = next(parent for parent in path.parents if parent.name == "work")
     (points,) = _spooled(work.parent.parent / "1.4_7.las", work)
     if sum(points.counts.values()) != 300:

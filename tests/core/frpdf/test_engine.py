@@ -136,7 +136,7 @@ def test_an_error_in_a_thread_ends_the_pass(arrays, monkeypatch):
 
     monkeypatch.setattr(engine_module, "threads", lambda: 3)
     engine, pieces = engine_of("OPENCV", arrays), quarters(40, 40, 20, 20)
-    monkeypatch.setattr(engine_module, "_steps", lambda number: [Step(0, fails)])
+    monkeypatch.setattr(engine, "_steps", lambda number: [Step(0, fails)])
     with pytest.raises(BrokenLayerError):
         engine.sweep(*[cut(noise(40, 40), pieces)] * 2, 1, pieces, SILENT)
 

@@ -9,7 +9,7 @@ from heard import Heard
 from rail_extract.core import pipeline
 from rail_extract.core.checks.lines import warn_of_split_classes
 from rail_extract.core.clouds.points import RailPoints
-from rail_extract.core.errors import Cancelled, NoTrackError, ParameterError
+from rail_extract.core.errors import Cancelled, ParameterError
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.pipeline import Parameters, extract_files, extract_rails
 from rail_extract.core.polyline import length_along, project
@@ -70,13 +70,6 @@ def test_a_track_between_two_gauges_is_one_track(gauge):
     assert len(first) == len(second) == 1
     assert first[0].gauge_mm == pytest.approx(1000 * gauge, abs=0.2)
     assert first[0].length_m == pytest.approx(second[0].length_m, abs=1e-6)
-
-
-def test_a_gauge_without_track_is_an_error_only_if_no_gauge_has_one():
-    rails = rails_at(CURVES[0], 0.0, 1.0 + WIDTH)
-    assert len(tracks_of(rails, Parameters(1.435, WIDTH, other_gauges_m=(1.0,)))) == 1
-    with pytest.raises(NoTrackError):
-        tracks_of(rails, Parameters(1.435, WIDTH))
 
 
 def test_a_class_without_track_is_a_warning_if_another_class_has_one():

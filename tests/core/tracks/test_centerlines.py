@@ -107,28 +107,6 @@ def test_cant_is_left_minus_right_along_the_line(sign, heading):
     np.testing.assert_allclose(line.xyz[:, 2], 0.002 * along, atol=0.002)
 
 
-def test_largest_cant_keeps_its_sign():
-    cant = np.linspace(0.02, -0.08, len(STRAIGHT.xy))
-    left, right, _ = track(STRAIGHT, cant=cant)
-    (line,) = build_centerlines(rails_of(left, right), STANDARD)
-    assert line.cantmax_mm == pytest.approx(-80, abs=1)
-    assert line.cant_mm == pytest.approx(-30, abs=1)
-
-
-@pytest.mark.parametrize("curve", [STRAIGHT, CURVED])
-def test_rails_broken_in_different_places_give_one_centerline(curve):
-    left, right, middle = track(curve)
-    left_parts, right_parts = without(left, 0.3, 0.32), without(right, 0.6, 0.62)
-    rails = rails_of(left_parts[1], left_parts[0][::-1], right_parts[0], right_parts[1])
-    (line,) = build_centerlines(rails, STANDARD)
-    result = compare_lines([line.xyz], [middle])
-    assert result.completeness > 0.99
-    assert result.lateral_p95_m < 0.003
-    assert {line.left_ids, line.right_ids} == {(2, 1), (3, 4)}
-    gaps = [np.linalg.norm(second[0] - first[-1]) for first, second in (left_parts, right_parts)]
-    assert line.bridged_m == pytest.approx(sum(gaps), abs=0.5)
-
-
 @pytest.mark.parametrize(("gap", "count"), [(4.0, 1), (8.0, 2)])
 def test_gaps_in_both_rails_are_bridged_up_to_the_maximum(gap, count):
     share = gap / CURVED.length_m
@@ -164,16 +142,6 @@ def test_turnouts_fork_into_two_centerlines(form, hand):
     assert result.correctness > 0.995
     assert result.completeness > 0.995
     assert max(line.length_m for line in found) == pytest.approx(110.0, abs=1.0)
-
-
-def test_rails_without_heights_give_a_centerline_without_heights():
-    left, right, middle = track(CURVED)
-    rails = rails_of(left * [1, 1, np.nan], right * [1, 1, np.nan])
-    (line,) = build_centerlines(rails, STANDARD)
-    assert np.isnan(line.xyz[:, 2]).all()
-    assert np.isnan(line.cant_mm)
-    assert line.gauge_mm == pytest.approx(1435.0, abs=1.0)
-    assert line.length_m == pytest.approx(CURVED.length_m, abs=0.5)
 
 
 @pytest.mark.parametrize("cant", [0.0, 0.1])
@@ -231,14 +199,6 @@ def test_rails_off_the_gauge_within_the_tolerance_make_a_track(curve, off):
     (line,) = build_centerlines(rails_of(left, right), replace(STANDARD, centerline_tolerance_m=0.5))
     assert line.gauge_mm == pytest.approx(1000 * (GAUGE + off), abs=0.5)
     assert compare_lines([line.xyz], [middle]).lateral_rmse_m < 0.001
-
-
-def test_single_rails_give_no_centerline():
-    left, right, _ = track(STRAIGHT)
-    assert build_centerlines([], STANDARD) == ()
-    assert build_centerlines(rails_of(left), STANDARD) == ()
-    assert build_centerlines(rails_of(left, right + [2.0, -2.0, 0.0]), STANDARD) == ()
-    assert build_centerlines(rails_of(left[:4], right[:4]), STANDARD) == ()
 
 
 @pytest.mark.parametrize("sign", [1, -1])

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from memory_layers import layer_of
-from qgis.core import NULL
 
 CORNER = np.array([500_000.0, 3_000_000.0, 100.0])
 NAMES = (
@@ -34,21 +33,12 @@ def rails(left_m=0.0, numbers=(4, 5), sigma_mm=1.0, **changed):
 
 
 @pytest.fixture
-def compare(run_step, context, new_feedback):
+def compare(run_table):
     """Compare, and return results, values by field, and what was said."""
 
     def run(reference, lines, **parameters):
-        feedback = new_feedback()
-        given = {"REFERENCE": reference, "INPUT": lines, "OUTPUT": "memory:", **parameters}
-        outcome = run_step("comparetracks", given, feedback)
-        assert outcome.ok, outcome.error
-        layer = context.getMapLayer(outcome.results["OUTPUT"])
-        rows = [feature.attributes() for feature in layer.getFeatures()]
-        columns = {
-            name: np.array([None if row[at] == NULL else row[at] for row in rows], dtype=object)
-            for at, name in enumerate(layer.fields().names())
-        }
-        return outcome.results, columns, feedback
+        results, _, values, feedback = run_table("comparetracks", REFERENCE=reference, INPUT=lines, **parameters)
+        return results, {name: np.array(column, dtype=object) for name, column in values.items()}, feedback
 
     return run
 

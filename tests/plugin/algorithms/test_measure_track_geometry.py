@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from memory_layers import layer_of
-from qgis.core import NULL, QgsVectorLayer
+from qgis.core import QgsVectorLayer
 from rail_extract.core.jobs import track_inputs
 
 SPACING_MM = 1507.0
@@ -31,20 +31,13 @@ def curved_track(**kind):
 
 
 @pytest.fixture
-def measure(qgis, run_step, context):
+def measure(run_table):
     """Measure tracks, and return the outcome and the values of the points by field."""
 
     def run(centerlines, rails, feedback=None, **parameters):
-        given = {"INPUT": centerlines, "RAILS": rails, "OUTPUT": "memory:", **parameters}
-        outcome = run_step("measuretrackgeometry", given, *([feedback] if feedback else []))
-        assert outcome.ok, outcome.error
-        layer = context.getMapLayer(outcome.results["OUTPUT"])
-        features = list(layer.getFeatures())
-        values = {
-            name: np.array([np.nan if feature[name] == NULL else feature[name] for feature in features], dtype=float)
-            for name in layer.fields().names()
-        }
-        return outcome.results, layer, values
+        given = {"INPUT": centerlines, "RAILS": rails, **parameters}
+        results, layer, values, _ = run_table("measuretrackgeometry", feedback, **given)
+        return results, layer, {name: np.array(column, dtype=float) for name, column in values.items()}
 
     return run
 

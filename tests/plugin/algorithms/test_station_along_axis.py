@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from memory_layers import layer_of
 from qgis.core import (
-    NULL,
     QgsCoordinateReferenceSystem,
     QgsCoordinateTransform,
     QgsGeometry,
@@ -42,19 +41,12 @@ def moved(source, crs):
 
 
 @pytest.fixture
-def station(run_step, context, new_feedback):
+def station(run_table):
     """Run, and return results, values by field, and what was said."""
 
     def run(places, axis, **parameters):
-        feedback = new_feedback()
-        given = {"INPUT": places, "AXIS": axis, "OUTPUT": "memory:", **parameters}
-        outcome = run_step("stationalongaxis", given, feedback)
-        assert outcome.ok, outcome.error
-        made = context.getMapLayer(outcome.results["OUTPUT"])
-        rows = [feature.attributes() for feature in made.getFeatures()]
-        names = made.fields().names()
-        values = {name: [None if row[at] == NULL else row[at] for row in rows] for at, name in enumerate(names)}
-        return outcome.results, values, feedback.warnings
+        results, _, values, feedback = run_table("stationalongaxis", INPUT=places, AXIS=axis, **parameters)
+        return results, values, feedback.warnings
 
     return run
 
