@@ -178,7 +178,6 @@ SWITCHES = (
     _rule("alignment.structure._hang_together", lambda *_: True),
     _rule("alignment.structure.SHOULDER_M", np.inf),
     _rule("alignment.structure._united", lambda chain, *_: chain),
-    _rule("alignment.structure._widened", nothing),
     _rule("alignment.structure._between", lambda chain, *_: chain),
     _rule("alignment.structure._joined", nothing),
     _rule("alignment.layouts._snapped", lambda chain, *_: (chain, np.zeros(len(chain.p), dtype=bool))),

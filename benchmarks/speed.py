@@ -21,7 +21,8 @@ START = time.perf_counter()
 from rail_extract.core import pipeline  # noqa: E402
 from rail_extract.core.clouds.points import read_rail_points  # noqa: E402
 from rail_extract.core.frpdf import ENGINES  # noqa: E402
-from rail_extract.core.frpdf.models import NAMES, choose, load_arrays  # noqa: E402
+from rail_extract.core.frpdf.models import NAMES, choose  # noqa: E402
+from rail_extract.core.frpdf.weights import load_arrays  # noqa: E402
 from rail_extract.core.squares import steps  # noqa: E402
 from rail_extract.core.standards import resolve  # noqa: E402
 from speed_network import CLOCKS, Cut, cells_table, changes_table, speed_table  # noqa: E402

@@ -10,10 +10,7 @@ import math
 from dataclasses import dataclass
 from typing import Optional
 
-import numpy as np
-
 from .errors import DesignNumberError
-from .polyline import Polyline
 
 MAX_PLACE_M = 1e9
 """Largest coordinate, height or station, metres: twenty-five times round the earth, and exact to a micrometre."""
@@ -35,13 +32,6 @@ MAX_TURNS = 100.0
 
 QUOTED = 40
 """Characters of a text that a message quotes."""
-
-MAX_SEGMENT_M = 100_000.0
-"""A longer straight segment of a measured line or a guide has a stray vertex: in the plane of a map, a railway that is
-straight on the ground bows by metres over this length."""
-
-MAX_SPIKE_M = 10_000.0
-"""A longer straight segment from which the line turns back has a stray vertex."""
 
 
 @dataclass(frozen=True)
@@ -75,7 +65,7 @@ TURNS = Kind(0.0, MAX_TURNS, f"an element turns by up to {MAX_TURNS:g} revolutio
 
 
 def checked(value: float, kind: Kind, where: str, name: str) -> float:
-    """Return a number if it is of a kind; `where` states it as `name`, for the message of the DesignNumberError.
+    """Return a number if it is of a kind, else raise a DesignNumberError that names `name` and `where` it stands.
 
     Examples
     --------
@@ -112,34 +102,3 @@ def quoted(value: object) -> str:
     """Return a value of a field as messages show it, on one line and not too long."""
     text = repr(value)
     return text if len(text) <= QUOTED else f"{text[:QUOTED]}…"
-
-
-def check_places(xy: np.ndarray, where: str, unit_m: float = 1.0) -> np.ndarray:
-    """Return places, (n, 2), in units of `unit_m` metres, if all are on the map; `where` has them, for the message."""
-    wrong = xy[~are_places(xy, unit_m)]
-    for value in wrong.ravel() if len(wrong) else ():
-        checked(float(value) * unit_m, NUMBER, where, "coordinate")
-    return xy
-
-
-def are_places(xy: np.ndarray, unit_m: float = 1.0) -> np.ndarray:
-    """Return which places, (n, 2) in units of `unit_m` metres, are on the map, (n,) bool."""
-    return (np.abs(xy) <= MAX_PLACE_M / unit_m).all(axis=1)
-
-
-def check_line(xy: np.ndarray, where: str, unit_m: float = 1.0) -> np.ndarray:
-    """Return the vertices of a guide, (n, 2) in units of `unit_m` metres, if they are on the map and none is stray."""
-    check_places(xy, where, unit_m)
-    checked(Polyline(xy).length_m * unit_m, LENGTH, where, "length")
-    if has_stray(xy * unit_m):
-        raise DesignNumberError(f"{where} has a stray vertex: repair or delete it.")
-    return xy
-
-
-def has_stray(xy: np.ndarray) -> bool:
-    """Return whether a line, (n, 2) metres in plan, has a vertex that is a mistake: too far from the others."""
-    steps = np.diff(xy, axis=0)
-    lengths_m = np.hypot(*steps.T)
-    turns_back = np.einsum("ij,ij->i", steps[:-1], steps[1:]) < 0
-    spikes_m = np.maximum(lengths_m[:-1], lengths_m[1:])[turns_back]
-    return bool(lengths_m.max() > MAX_SEGMENT_M or spikes_m.max(initial=0.0) > MAX_SPIKE_M)

@@ -13,19 +13,11 @@ UNKNOWN_IN_METRES = 'LOCAL_CS["Undefined Cartesian SRS",UNIT["metre",1]]'
 
 @dataclass(frozen=True)
 class Field:
-    """A field of a result layer.
+    """A field of a result layer: int, float or str.
 
-    Attributes
-    ----------
-    name : str
-        Name of the attribute of `RailLine`, `Centerline` or `TrackGeometry` that the field holds. It ends with the unit
-        and has at most ten characters, so that a shapefile does not cut it.
-    kind : type
-        int, float or str.
-    meaning : str
-        For the documentation and the help texts.
-    decimals : int
-        Decimals of a float; more would only show what no scanner resolves.
+    `name` is that of the attribute of `RailLine`, `Centerline` or `TrackGeometry` that the field holds. It ends with
+    the unit and has at most ten characters, so that a shapefile does not cut it. `meaning` is for the documentation and
+    the help texts; more `decimals` would only show what no scanner resolves.
     """
 
     name: str

@@ -80,13 +80,7 @@ class Progress:
     def follow(self, items: Iterable[Item], total: int) -> Iterator[Item]: ...
 
     def follow(self, items, total=None):
-        """Yield `items`; before each, check for cancellation, and after each, advance the fraction.
-
-        Parameters
-        ----------
-        total : int, optional
-            Number of items, if `items` does not know it.
-        """
+        """Yield items, `total` in number; before each, check for cancellation; after each, advance the fraction."""
         count = len(items) if total is None else total
         for number, item in enumerate(items, start=1):
             self.check()

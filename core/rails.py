@@ -346,14 +346,8 @@ class TrackGeometry:
 class StripCourse:
     """Offsets of one strip, a pass of the scanner, from the mean of all strips along a track; (n,) arrays.
 
-    Attributes
-    ----------
-    track_id, strip : int
-        Track, and number of the strip.
-    chainage_m : float
-        Plan distance from the start of the centerline of places that another strip shows as well.
-    across_mm, up_mm : float
-        Offset to the left, seen along the centerline, and upwards.
+    `chainage_m` is the plan distance from the start of the centerline of places that another strip shows as well;
+    `across_mm` and `up_mm` are the offsets to the left, seen along the centerline, and upwards.
     """
 
     track_id: int
@@ -415,6 +409,8 @@ class SearchFigures:
     sharp_m, round_m : float
         Length of the rails with a partner that are as narrow as a head, and of those that are wider and round, before
         the cloud is known to be blunt; see `classify.sharpness`.
+    unsure_m : float
+        Length of those that are wider and not round, and of rails in pavements.
     """
 
     points: int = 0
@@ -430,6 +426,7 @@ class SearchFigures:
     blur_m2: float = 0.0
     sharp_m: float = 0.0
     round_m: float = 0.0
+    unsure_m: float = 0.0
 
     def __add__(self, other: SearchFigures) -> SearchFigures:
         return SearchFigures(*(one + more for one, more in zip(astuple(self), astuple(other))))

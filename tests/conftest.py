@@ -27,7 +27,8 @@ def network():
 @pytest.fixture(scope="session")
 def random_arrays():
     """Weights with the names and shapes of the shipped ones and random values, made without PyTorch."""
-    from rail_extract.core.frpdf.models import MODELS, load_arrays
+    from rail_extract.core.frpdf.models import MODELS
+    from rail_extract.core.frpdf.weights import load_arrays
 
     rng = np.random.default_rng(3)
     arrays = {}

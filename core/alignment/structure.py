@@ -225,8 +225,8 @@ def _hang_together(chain: Chain, samples: Samples) -> bool:
     )
 
 
-RAMPS_M = (8.0, 32.0)
-"""Lengths of a ramp that replaces a jump, metres; the fit lengthens it."""
+RAMP_M = 8.0
+"""Length of a ramp that replaces a jump, metres; the fit lengthens it."""
 
 SPLITS = (0.2, 0.4, 0.6, 0.8)
 """Where a ramp or a part is divided, as shares of its length."""
@@ -261,8 +261,6 @@ def richer(chain: Chain, m: int, ramps: bool, jumps: bool, least_m: float) -> It
     length = end - start
     if not chain.curved[m]:
         yield _with_curved(chain, m, True)
-    if length == 0.0 and 0 < m < len(chain.bends) - 1:
-        yield from _widened(chain, m, least_m)
     if m < len(chain.p):
         yield from _richer_joint(chain, m, ramps, least_m)
     for share in SPLITS if length > 3.0 * least_m else ():
@@ -287,7 +285,7 @@ def _richer_joint(chain: Chain, m: int, ramps: bool, least_m: float) -> Iterator
         return
     if p == q:
         room = 2.0 * min(p - starts[m], ends[m + 1] - p) - 2.0 * least_m
-        for length in (*RAMPS_M, 0.5 * room):
+        for length in (RAMP_M, 0.5 * room):
             if least_m < length <= room:
                 yield _with_joint(chain, m, p - 0.5 * length, p + 0.5 * length)
         return
@@ -336,18 +334,6 @@ def _with_joint(chain: Chain, j: int, p: float, q: float) -> Chain:
     ps, qs = chain.p.copy(), chain.q.copy()
     ps[j], qs[j] = p, q
     return replace(chain, p=ps, q=qs)
-
-
-def _widened(chain: Chain, m: int, least_m: float) -> Iterator[Chain]:
-    """Yield chains in which part `m`, which has no length, gets one, as a curve or as a line."""
-    middle, half = chain.p[m], 0.6 * least_m
-    if middle - half > chain.p[m - 1] + least_m and middle + half < chain.q[m] - least_m:
-        p, q = chain.p.copy(), chain.q.copy()
-        q[m - 1], p[m] = middle - half, middle + half
-        wide = replace(chain, p=p, q=q)
-        yield wide
-        if chain.curved[m]:
-            yield _with_curved(wide, m, False)
 
 
 def _between(chain: Chain, m: int, start: float, end: float) -> Chain:

@@ -92,6 +92,9 @@ class Flush:
     rails: Lines
 
 
+NO_FLUSH = Flush(np.empty(0, dtype=np.int64), NO_LINES, NO_LINES)
+
+
 def flush_rails(
     coarse: Coarse,
     near: np.ndarray,
@@ -115,16 +118,15 @@ def flush_rails(
         Cell of each of these points.
     settings : Settings
     """
-    nothing = Flush(np.empty(0, dtype=np.int64), NO_LINES, NO_LINES)
     head_width_m = settings.head_width_m
     level_m = _pavement(coarse, coarse.cell[near], height)
     if not np.isfinite(level_m).any():
-        return nothing
+        return NO_FLUSH
     below = level_m[coarse.cell[near]] - height
     hollow = np.flatnonzero((below > CAVITY_M[0]) & (below < CAVITY_M[1]))
     marks = centroids(cell[hollow], xy[hollow])
     if len(marks) < 2:
-        return nothing
+        return NO_FLUSH
     lines = find_lines(Marks(marks, np.zeros(len(marks))), REACH_M, 1.0, BESIDE_LINE_M)
     lines = lines.of(lines.good(MIN_COVER, MIN_PURE))
     flat = xy[np.abs(below) < HEAD_LEVEL_M]

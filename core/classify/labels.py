@@ -98,8 +98,9 @@ def label(tops: Tops, heads: np.ndarray, cell: np.ndarray, height: np.ndarray, t
     top[around] = _mean_tops(window, tops, image)
     image.ravel()[heads] = tops.top.ravel()[heads] >= (top[heads] - UNDER_MEAN_M) * MILLIMETRES
     top[around] = _mean_tops(window, tops, image)
-    above = height - top[cell]
-    return np.flatnonzero((above >= -tolerances.below_m) & (above <= tolerances.above_m))
+    top = top[cell]
+    below_m = np.minimum(tolerances.below_m, tolerances.below_share * top)
+    return np.flatnonzero((height >= top - below_m) & (height <= top + tolerances.above_m))
 
 
 def _mean_tops(window: Window, tops: Tops, image: np.ndarray) -> np.ndarray:

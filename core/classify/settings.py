@@ -33,10 +33,14 @@ class Tolerances:
     beside_line_m : float
         Distance from a line within which a cell is on it: half a head, half a cell's diagonal and noise.
     partner_m : float
-        Difference in height above the bed between the two rails of a track.
+        Difference in height above the bed between the two rails of a track: beside a shoulder or a platform, their
+        beds differ by up to 6 cm.
     below_m, above_m : float
         Heights of rail points relative to the mean top: half a head downwards, and noise with the waves of the bed
         upwards.
+    below_share : float
+        Part of the height above the bed down to which they are at most: where the bed reaches up to the heads, its
+        stones stand as high as the other half, and would widen the heads.
     beside_m : float
         Distance beyond the side of the head within which a point is still on it: the axis is known to a centimetre, and
         the beam is as wide.
@@ -55,6 +59,7 @@ class Tolerances:
     partner_m: float
     below_m: float
     above_m: float
+    below_share: float
     beside_m: float
     least_m: float
     band: Band
@@ -71,9 +76,10 @@ DENSE = Tolerances(
     along_m=0.035,
     spread_m=0.045,
     beside_line_m=0.050,
-    partner_m=0.05,
+    partner_m=0.08,
     below_m=0.040,
     above_m=0.025,
+    below_share=0.5,
     beside_m=0.02,
     least_m=LEAST_M,
     band=HEADS,
@@ -89,6 +95,7 @@ THIN = Tolerances(
     partner_m=0.07,
     below_m=0.045,
     above_m=0.065,
+    below_share=0.5,
     beside_m=0.035,
     least_m=2 * LEAST_M,
     band=HEADS,
@@ -97,7 +104,7 @@ THIN = Tolerances(
 )
 """For scanners in the air: a beam of 4 to 9 cm blends the head and the ballast."""
 
-BLUNT = replace(DENSE, band=BURIED, least_m=5.0, below_m=0.12, above_m=0.06)
+BLUNT = replace(DENSE, band=BURIED, least_m=5.0, partner_m=0.05, below_m=0.12, below_share=3.0, above_m=0.06)
 """For clouds that blur a head to a round ridge. Any mound of its width is as round, and up to 4 m of one are opposite
 something else by chance. Beside its crest, the ridge falls by up to 5 cm; noise and a bed that slopes add as much. A
 limit that cut the lower side off would move the line, and one near the mean of the tops would lower it."""

@@ -38,12 +38,20 @@ Answer = TypeVar("Answer", bound=HasFigures)
 
 def is_blunt(seen: SearchFigures) -> bool:
     """Return whether a cloud is blunt, by the sum of the figures of parts that were searched as if it were sharp."""
-    return seen.sharp_m < min(SHARP_M, seen.round_m)
+    return seen.sharp_m < min(SHARP_M, _round_m(seen))
 
 
 def is_decided(seen: SearchFigures) -> bool:
     """Return whether further parts would not change that."""
-    return seen.sharp_m >= SHARP_M or seen.round_m >= BLUNT_M
+    return seen.sharp_m >= SHARP_M or _round_m(seen) >= BLUNT_M
+
+
+def _round_m(seen: SearchFigures) -> float:
+    """Return the length of round rails that those which are neither narrow nor round do not outweigh.
+
+    These are rather those of a sharp cloud. But images of smooth ground showed 29 m of rails in pavements, by chance.
+    """
+    return seen.round_m - seen.unsure_m
 
 
 def search_alike(parts: Sequence[Part], search: Callable[[Sequence[Part], bool], Iterable[Answer]]) -> Iterator[Answer]:

@@ -8,11 +8,13 @@ import numpy as np
 
 from ..rails import SearchFigures
 from .bed import COARSE_M, Bed, Coarse
-from .flush import Flush, flush_rails
+from .flush import NO_FLUSH, Flush, flush_rails
 from .labels import Near, label, whole_heads
 from .lines import SINGLE_COVER, Lines, Marks, centred, find_lines, reach_at
 from .partner import have_partners, runs_inside
 from .pieces import (
+    LEAST_SINGLE_M,
+    lengths,
     links,
     long_enough,
     lower_than_beside,
@@ -34,14 +36,24 @@ DENSITY_QUANTILE = 0.75
 SINGLE_HEIGHT_M = 0.12
 """Least height above the bed of a rail without a partner: lower things are edges of slopes, kerbs and boards."""
 
+AS_HIGH_M = 0.03
+"""A rail without a partner may be lower if it stands as high as the rails of the square that have one, within this:
+ballast differs as much from track to track. Measured: 11 mm; kerbs and edges of slopes beside tracks 41 mm and more."""
+
 SINGLE_WIDTH = 0.2
 """Least width of a rail without a partner by that of a head. A single profile of the scanner is a bar of no width where
 the ground falls beside it, as at the edge of a road: measured 2 to 4 mm. Heads measure 68 mm, and 19 mm where a train
 hides most of them."""
 
-SINGLE_SLOPE = 0.4
-"""Steepest bed of a rail without a partner: that of the shoulder of a ballast bed is 0.67. Where the far side of a
-slope is hidden, its crest looks like a bar."""
+SINGLE_SLOPE = 0.3
+"""Steepest bed of a rail without a partner: cant of 180 mm is 0.12, and a shoulder beside the rail makes it 0.22 at
+most; at the shoulder of a ballast bed it is 0.67. Where the far side of a slope is hidden, its crest looks like a bar
+on a bed of 0.38 and more."""
+
+SHARP_WIDER_M = 0.016
+"""Width beyond that of a head up to which a piece shows that the cloud is sharp. Measured over half of the rails of a
+cloud and more: up to 11 mm by scanners on vehicles, 13 mm by wide beams from the air, and from 20 mm on in images that
+blur by 3 cm, where a wider limit kept one rail and dropped the next."""
 
 NOISE_ACROSS_M = 0.01
 """Largest distance beyond the side of a head at which the top of a cell counts towards its axis. With half the gap to
@@ -176,7 +188,7 @@ def classify_square(xyz: np.ndarray, settings: Settings) -> ByShape:
     grid, cell = Grid.around(xy[:, 0], xy[:, 1], settings.cell_m)
     tops = tops_of(grid, cell, height, z[near])
     standing = _standing(Shown(xy, cell, height, bed, tops), settings)
-    paved = flush_rails(bed.coarse, near, xy, height, grid, cell, settings)
+    paved = NO_FLUSH if settings.blunt else flush_rails(bed.coarse, near, xy, height, grid, cell, settings)
     in_pavement = rail.copy()
     in_pavement[near[paved.points]] = True
     found = np.append(near[standing.points], near[paved.points])
@@ -208,7 +220,7 @@ class Standing:
         Whether the square is thin.
     rails : Kept
         Those that the guide leaves out as well.
-    sharp_m, round_m : float
+    sharp_m, round_m, unsure_m : float
         See `SearchFigures`.
     blur_m : float
         Blur of the ridges of a blunt cloud.
@@ -220,6 +232,7 @@ class Standing:
     rails: Kept
     sharp_m: float = 0.0
     round_m: float = 0.0
+    unsure_m: float = 0.0
     blur_m: float = 0.0
 
 
@@ -245,18 +258,21 @@ def _on_bars(
     heads = whole_heads(shown.tops, _completed(found, kept, settings, tolerances), tolerances)
     chosen = label(shown.tops, heads, shown.cell, shown.height, tolerances)
     beside = Near.find(shown.xy[chosen], kept.lines)
-    narrow, sharp, rounded = _widths(kept, beside, shown, settings, tolerances)
+    narrow, *kinds = _widths(kept, beside, shown, settings, tolerances)
     standing = _wanted(kept, narrow, chosen, beside, thin, settings, tolerances)
     share_m = _share_m(kept, settings)
-    return replace(standing, sharp_m=float(share_m[sharp].sum()), round_m=float(share_m[rounded].sum()))
+    sharp_m, round_m, unsure_m = (float(share_m[kind].sum()) for kind in kinds)
+    return replace(standing, sharp_m=sharp_m, round_m=round_m, unsure_m=unsure_m)
 
 
 def _on_ridges(kept: Kept, thin: bool, shown: Shown, settings: Settings) -> Standing:
     """Keep the cells of ridges that may be heads, with their axes on the crests.
 
-    All of them have a partner, because a mound of this width is as round.
+    All of them have a partner, because a mound of this width is as round; and only they show the blur, because the
+    width of other things is not known.
     """
     blur_m = 0.0
+    kept = kept.of(with_partner(kept.pairs, kept.paired))
     if len(kept.cell):
         piece = pieces_of(len(kept.cell), kept.pairs)
         ridges = Ridges.measure(shown.xy, shown.height, kept.lines, piece)
@@ -304,6 +320,7 @@ def _standing_figures(standing: Standing, settings: Settings) -> SearchFigures:
         blur_m2=blunt_m * standing.blur_m,
         sharp_m=standing.sharp_m,
         round_m=standing.round_m,
+        unsure_m=standing.unsure_m,
     )
 
 
@@ -318,7 +335,7 @@ def _flush_figures(flush: Flush, cell: np.ndarray, settings: Settings) -> Search
     along_m, across_m = beside_guide(flush.rails, settings)
     return SearchFigures(
         paired_m=float(share_m.sum()),
-        sharp_m=float(share_m.sum()),
+        unsure_m=float(share_m.sum()),
         cells=len(np.unique(cell)),
         paved=int(len(share_m) > 0),
         along_m=float(along_m),
@@ -401,7 +418,7 @@ def _near_axes(marks: Marks, kept: Kept, settings: Settings, height_m: float) ->
 
 def _widths(
     kept: Kept, beside: Near, shown: Shown, settings: Settings, tolerances: Tolerances
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Judge the cells by the width of the tops of their pieces.
 
     Parameters
@@ -417,35 +434,47 @@ def _widths(
     -------
     narrow : (n,) bool array
         Rails: as narrow as a head in a square of this density.
-    sharp, rounded : (n,) bool arrays
-        Those with a partner that are as narrow as a head in a sharp cloud, and those that are wider and round.
+    sharp, rounded, unsure : (n,) bool arrays
+        Those with a partner that are as narrow as a head in a sharp cloud, those that are wider and round, and those
+        that are wider and steep.
     """
     if not len(kept.cell):
-        return (np.zeros(0, dtype=bool),) * 3
+        return (np.zeros(0, dtype=bool),) * 4
     piece = pieces_of(len(kept.cell), kept.pairs)
     width_m = beside.widths(piece)
     partnered = with_partner(kept.pairs, kept.paired)
     narrow = width_m < settings.head_width_m + tolerances.wider_m
-    alone = _stands_alone(kept, piece, width_m, shown.bed, settings, tolerances)
-    sharp = partnered & (width_m < settings.head_width_m + DENSE.wider_m)[piece]
-    rounded = partnered & ~sharp
+    rails = kept.lines.height[partnered & narrow[piece] & (lengths(kept.lines.axis, piece) >= LEAST_SINGLE_M)[piece]]
+    alone = _stands_alone(kept, piece, width_m, rails, shown.bed, settings, tolerances)
+    sharp = partnered & (width_m < settings.head_width_m + SHARP_WIDER_M)[piece]
+    rounded = unsure = partnered & ~sharp
     if rounded.any():
         spread_m = Ridges.measure(shown.xy, shown.height, kept.lines, piece).spread_m
-        rounded &= (spread_m > settings.head_width_m / 2)[piece]
-    return np.where(partnered, narrow[piece], alone[piece]), sharp, rounded
+        rounded = rounded & (spread_m > settings.head_width_m / 2)[piece]
+        unsure = unsure & (spread_m <= settings.head_width_m / 2)[piece]
+    return np.where(partnered, narrow[piece], alone[piece]), sharp, rounded, unsure
 
 
 def _stands_alone(
-    kept: Kept, piece: np.ndarray, width_m: np.ndarray, bed: Bed, settings: Settings, tolerances: Tolerances
+    kept: Kept,
+    piece: np.ndarray,
+    width_m: np.ndarray,
+    rails: np.ndarray,
+    bed: Bed,
+    settings: Settings,
+    tolerances: Tolerances,
 ) -> np.ndarray:
     """Return which pieces, of (pieces,) widths, may be rails without a partner, (pieces,) bool.
 
-    They are as narrow as a head and no narrower, stand as high as a rail does that is not buried in ballast, and their
-    bed is not steeper than a track's.
+    They are as narrow as a head and no narrower, stand as high as a rail does that is not buried in ballast, or as the
+    rails that have a partner, (k,) heights, and their bed is not steeper than a track's.
     """
     narrow = width_m < settings.head_width_m + tolerances.wider_single_m
     narrow &= width_m >= SINGLE_WIDTH * settings.head_width_m
-    high = _mean(kept.lines.height, piece) >= SINGLE_HEIGHT_M
+    height_m = _mean(kept.lines.height, piece)
+    high = height_m >= SINGLE_HEIGHT_M
+    if len(rails):
+        high |= np.abs(height_m - np.median(rails)) < AS_HIGH_M
     return narrow & high & (_mean(bed.slopes(kept.lines.axis), piece) <= SINGLE_SLOPE)
 
 

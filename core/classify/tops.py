@@ -36,18 +36,11 @@ MILLIMETRES, TENTHS_OF_MM = 1000, 10_000
 
 @dataclass(frozen=True)
 class Band:
-    """Which tops may be those of rails.
+    """Which tops may be those of rails: at least `low_m` above the bed.
 
-    Attributes
-    ----------
-    low_m : float
-        Least height above the bed.
-    depth_share : float
-        Cells that are lower by this share of the height, or by `DEPTH_M` if that is less, are not part of the top.
-    slab_m : float
-        Tops are compared with their surroundings at thresholds this far apart.
-    shadows : bool
-        Whether what is not seen may be in a shadow: not in a cloud that is matched from images, and not in a thin one.
+    Cells that are lower by `depth_share` of the height, or by `DEPTH_M` if that is less, are not part of the top. Tops
+    are compared with their surroundings at thresholds `slab_m` apart. With `shadows`, what is not seen may be in a
+    shadow: not in a cloud that is matched from images, and not in a thin one.
     """
 
     low_m: float

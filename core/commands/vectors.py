@@ -16,7 +16,7 @@ import shapely
 
 from ..clouds.crs import import_pyproj, parse_crs
 from ..errors import ParameterError
-from ..files.writing import geometries_in
+from ..files.geopackage import geometries_in
 from ..jobs.declaration import LINE, POINT, POLYGON
 from ..jobs.features import Feature, FeatureSource
 from ..jobs.lines import Row

@@ -15,7 +15,7 @@ from ..design_numbers import CANT_MM, GRADE_PM, KM, NUMBER, RADIUS, WHOLE, check
 from ..errors import ParameterError, RailExtractError
 from ..fields import ELEMENT_FIELDS
 from ..frame import ORIGIN_STEP, LocalFrame
-from ..kilometres.stationing import read_km
+from ..kilometres.text import read_km
 from ..progress import SILENT, Progress
 from .design import within_plan
 

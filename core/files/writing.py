@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import sqlite3
 import struct
-from collections.abc import Iterator, Sequence
-from contextlib import closing, contextmanager
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -19,18 +17,13 @@ from ..errors import ParameterError
 from ..fields import UNKNOWN_IN_METRES, Field, Product
 from ..frame import LocalFrame
 from .exchange import Shape, write_shapes
+from .geopackage import tables_in
 from .layers import AnyLayer, Copy, Layer, written_by_name
 
 LINE_M, LINE_ZM = 2002, 3002
 """Codes of lines with M values in well-known binary."""
 
 KINDS = {int: np.int32, float: float, str: object}
-
-ENVELOPES = (0, 32, 48, 48, 64)
-"""Bytes of the envelope before a geometry, by its kind."""
-
-HEAD = 8
-"""Bytes before the envelope."""
 
 
 def write_layers(layers: Sequence[AnyLayer], destination: Destination, frame: LocalFrame) -> None:
@@ -134,35 +127,3 @@ def column_of(field: Field, written: Sequence[Any]) -> tuple[np.ndarray, np.ndar
     empty = np.array([value is None for value in written], dtype=bool)
     filler = 0 if field.kind is int else None
     return np.array([filler if value is None else value for value in written], dtype=KINDS[field.kind]), empty
-
-
-def tables_in(path: Path) -> set[str]:
-    """List the tables that a GeoPackage declares; none if there is no such file, or it is not a GeoPackage."""
-    try:
-        with _opened(path) as database:
-            return {name for (name,) in database.execute("SELECT table_name FROM gpkg_contents")}
-    except sqlite3.Error:
-        return set()
-
-
-def geometries_in(path: Path, table: str) -> dict[int, bytes]:
-    """Return the geometries of a table as well-known binary by the number of their feature, with M values."""
-    with _opened(path) as database:
-        column = "SELECT column_name FROM gpkg_geometry_columns WHERE table_name = ?"
-        ((name,),) = database.execute(column, (table,))
-        quoted = (one.replace('"', '""') for one in (name, table))
-        rows = database.execute('SELECT rowid, "{}" FROM "{}"'.format(*quoted))  # nosec B608 - names are quoted
-        return {number: _without_head(blob) for number, blob in rows if blob is not None}
-
-
-def _without_head(blob: bytes) -> bytes:
-    """Return the well-known binary of a geometry as it is stored."""
-    return blob[HEAD + ENVELOPES[(blob[3] >> 1) & 7] :]
-
-
-@contextmanager
-def _opened(path: Path) -> Iterator[sqlite3.Connection]:
-    """Provide a GeoPackage for reading."""
-    # Immutable: without locks and logs, which another program may hold; `disk.check_closed` looks at the logs.
-    with closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro&immutable=1", uri=True)) as database:
-        yield database

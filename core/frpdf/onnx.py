@@ -14,7 +14,8 @@ from pathlib import Path
 import numpy as np
 
 from .architecture import Convolution, FoldedLayer, block_side, fold
-from .models import MODELS, load_arrays
+from .models import MODELS
+from .weights import load_arrays
 
 IR_VERSION, OPERATOR_SET = 8, 13
 """Versions that runtimes since 2021 read."""

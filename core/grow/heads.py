@@ -263,7 +263,7 @@ class OnHeads:
         for step in sorted(product((-1, 0, 1), repeat=2), key=lambda step: step[0] ** 2 + step[1] ** 2):
             if not is_decided(seen):
                 seen += self._classified((key[0] + step[0], key[1] + step[1])).figures
-        self._is_decided = seen.sharp_m + seen.round_m > 0
+        self._is_decided = seen.sharp_m + seen.round_m + seen.unsure_m > 0
         if is_blunt(seen):
             self._own = replace(self._own, blunt=True)
             self._squares.clear()

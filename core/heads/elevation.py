@@ -145,7 +145,7 @@ def _measured(
     near: HeadPoints, free_ends: np.ndarray, parameters: ElevationParameters, strips: StripOffsets | None
 ) -> RailLine | None:
     """Measure one line, given its points and their strips; None if too few points support it."""
-    own = on_own_level(strips.aligned(near) if strips and parameters.align else near)
+    own = on_own_level(strips.moved(near, parameters.align) if strips else near)
     axis = Axis.of(own, unseen_m(parameters.cell_m))
     top = _top_of(own, axis, parameters)
     if top is None:

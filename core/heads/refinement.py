@@ -70,8 +70,8 @@ def _shifted(
     near = near_lines(network.lines, points.xyz, widths, points.strips, progress.span(0.0, 0.7), points.blunt)
     lines = []
     for line, head in zip(network.lines, progress.span(0.7, 1.0).follow(near)):
-        strips = measure_strips(head) if align else None
-        own = on_own_level(strips.aligned(head) if strips else head)
+        strips = measure_strips(head) if by_outline else None
+        own = on_own_level(strips.moved(head, align) if strips else head)
         axis = Axis.of(own, unseen_m(cell_m), by_outline)
         lines.append(line + axis.course.at(own.along)[:, None] * Polyline(line).normals)
     return _joined(network, lines, smoothing_m)

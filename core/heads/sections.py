@@ -6,7 +6,7 @@ station then show how far it is off there. See docs/method.md section 6.7.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -299,16 +299,32 @@ def likelier_width(lines: Sequence[np.ndarray], xyz: np.ndarray, widths_m: Seque
     grid, outlines = Grid.of(max(widths_m)), [Outline.of(width_m) for width_m in widths_m]
     likelihood = np.zeros(len(widths_m))
     for points in near_lines(lines, xyz, max(widths_m)):
-        left, up, _ = replace(points, width_m=widths_m[0]).in_frame()
-        bins = grid.number(left, up)
-        station = points.station[bins >= 0]
-        for first, last in _borders(station, len(points.stations)):
-            here = bins[bins >= 0][slice(*np.searchsorted(station, [first, last]))]
-            counts = np.bincount(here, minlength=grid.size).astype(float)
-            if counts.sum() >= MIN_SECTION_POINTS:
-                fits = [fit_section(counts, outline, grid) for outline in outlines]
-                likelihood += [log_likelihood(counts, fit, one, grid) for fit, one in zip(fits, outlines)]
+        for counts in _counted(replace(points, width_m=widths_m[0]), grid):
+            likelihood += [log_likelihood(counts, fit_section(counts, one, grid), one, grid) for one in outlines]
     return widths_m[int(np.argmax(likelihood))]
+
+
+def head_noise(points: HeadPoints) -> float:
+    """Return the noise about a head in the points of a line, across and in height together; infinite without points.
+
+    It is the logarithm of their product, in metres, and smaller where points show a sharper head.
+    """
+    grid, outline = Grid.of(points.width_m), Outline.of(points.width_m)
+    fits = [(counts.sum(), fit_section(counts, outline, grid).place[4:6].sum()) for counts in _counted(points, grid)]
+    weight, noise = np.array(fits).reshape(-1, 2).T
+    return float(np.average(noise, weights=weight)) if len(fits) else np.inf
+
+
+def _counted(points: HeadPoints, grid: Grid) -> Iterator[np.ndarray]:
+    """Yield the counts of points in the bins of each section of a line, (b,)."""
+    left, up, _ = points.in_frame()
+    bins = grid.number(left, up)
+    station = points.station[bins >= 0]
+    for first, last in _borders(station, len(points.stations)):
+        here = bins[bins >= 0][slice(*np.searchsorted(station, [first, last]))]
+        counts = np.bincount(here, minlength=grid.size).astype(float)
+        if counts.sum() >= MIN_SECTION_POINTS:
+            yield counts
 
 
 def _borders(station: np.ndarray, count: int) -> list[tuple[int, int]]:

@@ -19,6 +19,7 @@ from ..polyline import Polyline, distance_to, interpolate
 from ..rails import Support
 from .edges import edge_middles
 from .head_points import HeadPoints
+from .sections import head_noise
 from .top import find_top
 
 STEP_M = 1.0
@@ -76,6 +77,9 @@ class StripOffsets:
         Points on the head by strip, averaged over `MEETING_M` on either side.
     shown : (s, n) bool array
         Where a strip shows the line within `MEETING_M`.
+    gathered : (s, n) bool array
+        Where the points of a strip belong on the mean of the strips that are there: where it has points, apart from
+        short holes, if all of them together then show a sharper head.
     """
 
     t: np.ndarray
@@ -84,15 +88,26 @@ class StripOffsets:
     up: np.ndarray
     points: np.ndarray
     shown: np.ndarray
+    gathered: np.ndarray
 
-    def aligned(self, points: HeadPoints) -> HeadPoints:
-        """Move the points of the line onto the mean of all strips."""
+    def moved(self, points: HeadPoints, align: bool = False) -> HeadPoints:
+        """Move the points onto the mean of the strips that are at each place, or, to `align`, of all strips.
+
+        Heads that are side by side have no outline: a line would be on the highest of them, or on the densest.
+        """
         across, up = points.across.copy(), points.z.copy()
-        for number, strip in enumerate(self.strips):
-            mine = points.strips == strip
-            across[mine] -= np.interp(points.t[mine], self.t, self.across[number])
-            up[mine] -= np.interp(points.t[mine], self.t, self.up[number])
+        for values, offsets in ((across, self.across), (up, self.up)):
+            for strip, off in zip(self.strips, self._off(offsets, align)):
+                mine = points.strips == strip
+                values[mine] -= np.interp(points.t[mine], self.t, off)
         return replace(points, across=across, z=up)
+
+    def _off(self, offsets: np.ndarray, align: bool) -> np.ndarray:
+        """Return how far strips, by their `offsets`, are off the mean that their points are moved onto, (s, n)."""
+        if align:
+            return offsets
+        mean = np.where(self.gathered, offsets, 0.0).sum(axis=0) / np.maximum(self.gathered.sum(axis=0), 1)
+        return np.where(self.gathered, offsets - mean, 0.0)
 
     @property
     def count(self) -> np.ndarray:
@@ -108,7 +123,7 @@ class StripOffsets:
         ]
         return np.where(self.count >= 2, np.maximum(*spans), np.nan)
 
-    def standard_error(self, offsets: np.ndarray, aligned: bool) -> np.ndarray:
+    def standard_error(self, offsets: np.ndarray, align: bool) -> np.ndarray:
         """Return the standard error of a line that several strips show, (n,) metres.
 
         The mean of strips errs as their differences show; a line that follows some of them more than others errs by its
@@ -118,8 +133,8 @@ class StripOffsets:
         ----------
         offsets : (s, n) array
             `across` or `up`.
-        aligned : bool
-            Whether the points were moved onto the mean.
+        align : bool
+            See `moved`.
         """
         count, meeting = self.count, self.count >= 2
         if not meeting.any():
@@ -128,18 +143,18 @@ class StripOffsets:
         of_mean = np.sqrt(squares[meeting] / (count * (count - 1))[meeting])
         share = self.points / np.maximum(self.points.sum(axis=0), 1e-9)
         followed = np.zeros(len(self.t))
-        for number, own in enumerate(offsets):
+        for number, (own, off) in enumerate(zip(offsets, self._off(offsets, align))):
             known = meeting & self.shown[number]
             held = np.interp(self.t, self.t[known], own[known]) if known.any() else np.zeros(len(own))
-            followed += share[number] * (held - own if aligned else held)
+            followed += share[number] * (held - off)
         return np.hypot(np.interp(self.t, self.t[meeting], of_mean), followed)
 
-    def added_to(self, support: Support, aligned: bool) -> Support:
+    def added_to(self, support: Support, align: bool) -> Support:
         """Add the number of strips, their spread and what they disagree about to the support of the line."""
-        error_m = np.interp(support.t, self.t, self.standard_error(self.across, aligned))
+        error_m = np.interp(support.t, self.t, self.standard_error(self.across, align))
         nearest = np.clip(np.round(support.t / STEP_M - 0.5).astype(int), 0, len(self.t) - 1)
         strips = np.column_stack([np.maximum(self.count, 1)[nearest], self.spread_m[nearest], error_m])
-        up_m = np.interp(support.t, self.t, self.standard_error(self.up, aligned))
+        up_m = np.interp(support.t, self.t, self.standard_error(self.up, align))
         return replace(
             support,
             sigma_m=np.hypot(support.sigma_m, error_m),
@@ -165,14 +180,24 @@ def measure_strips(points: HeadPoints) -> StripOffsets | None:
     shown = maximum_filter1d(np.isfinite(across).astype(np.uint8), reach, axis=1, mode="constant") > 0
     away_m = distance_to(t[shown.sum(axis=0) >= 2], t)
     kept = 0.5 + 0.5 * np.cos(np.pi * np.clip(away_m / FADE_M, 0.0, 1.0))
-    return StripOffsets(
+    found = StripOffsets(
         t,
         np.array([strip for strip, _ in seen]),
         kept * _from_mean(across, _third_differences(points.line, t)),
         kept * _from_mean(up, np.zeros(max(len(t) - 3, 0))),
         uniform_filter1d(counts.astype(float), reach, axis=1, mode="constant"),
         shown,
+        _without_holes(counts > 0),
     )
+    sharper = not points.is_blunt and head_noise(found.moved(points)) < head_noise(points)
+    return found if sharper else replace(found, gathered=np.zeros_like(found.gathered))
+
+
+def _without_holes(there: np.ndarray) -> np.ndarray:
+    """Fill what a strip misses, (s, n) bool, for less than twice `HOLE_M`."""
+    hole = 2 * int(round(HOLE_M / STEP_M)) + 1
+    grown = maximum_filter1d(there.astype(np.uint8), hole, axis=1, mode="constant")
+    return minimum_filter1d(grown, hole, axis=1, mode="constant", cval=1) > 0
 
 
 def _steps(length_m: float) -> int:

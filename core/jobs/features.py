@@ -15,7 +15,7 @@ import numpy as np
 from ..airborne.survey import GuideLine, gauge_of
 from ..clouds.crs import parse_crs, title_of, unit_in_plan
 from ..clouds.mask import Mask
-from ..design_numbers import check_line, check_places
+from ..design_places import check_line, check_places
 from ..errors import CrsError, MissingError, ParameterError, RailExtractError
 from ..kilometres.axes import (
     AHEAD,
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from .values import Rows, Values
 
 
-from ..design_numbers import are_places
+from ..design_places import are_places
 
 FAR, NOWHERE = np.full(2, np.inf), np.full(2, np.nan)
 """Places of a feature that is not on any map, and of one without a geometry."""

@@ -62,7 +62,7 @@ def _run(values: Values, progress: Progress) -> Result:
     """Clean each band."""
     from ..frpdf.cleanup import clean
     from ..frpdf.engine import make_engine
-    from ..frpdf.models import load_arrays
+    from ..frpdf.weights import load_arrays
     from .result import Result
 
     header, model = _planned(values)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from ..design_numbers import KM
-from ..kilometres.stationing import HECTOMETRES, NOTATIONS
+from ..kilometres.text import HECTOMETRES, NOTATIONS
 from ..parameters import (
     LEAVE_OUT,
 )

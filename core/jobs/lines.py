@@ -15,7 +15,7 @@ from ..alignment.elements import Alignment
 from ..alignment.measured import Track, cant_of_rails, stations_by_track, with_cant
 from ..clouds.crs import MAX_COORDINATE, is_geographic, name_of, parse_crs, units, warn_of_scale
 from ..comparison.tracks import SurveyedLine
-from ..design_numbers import has_stray
+from ..design_places import has_stray
 from ..errors import CrsError, MissingError, RailExtractError
 from ..fields import CENTERLINE_FIELDS, RAIL_FIELDS, Field
 from ..files.table import alignments, check_table, frame_of, read_table
@@ -59,7 +59,7 @@ class LayerLines:
     ) -> LayerLines:
         """Check the lines of a layer, and put them into a local frame; `system` is that of `system_of`.
 
-        `name` is that of the layer's parameter, for messages. Raises RailExtractError if there is no line, or one with
+        Messages name the parameter of the layer, `name`. Raises RailExtractError if there is no line, or one with
         an impossible vertex.
         """
         crs_wkt, horizontal_unit_m, vertical_unit_m = system

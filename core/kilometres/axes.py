@@ -12,14 +12,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..design_numbers import KM, LENGTH, NUMBER, are_places, check_places, checked, number_in, quoted
+from ..design_numbers import KM, LENGTH, NUMBER, checked, number_in, quoted
+from ..design_places import are_places, check_places
 from ..errors import RailExtractError
 from ..frame import LocalFrame
 from ..polyline import Polyline
 from ..progress import SILENT, Progress
 from ..rails import Kilometres, TrackGeometry
 from .line import KilometreLine, locate, nearest
-from .stationing import Jump, Stationing, read_km, stationing_of
+from .stationing import Jump, Stationing, stationing_of
+from .text import read_km
 
 POST_OFFSET_M = 50.0
 """Posts further than this from the axis are left out, metres: they belong to another line."""

@@ -15,7 +15,8 @@ from scipy.spatial import cKDTree
 from ..polyline import Chords, Polyline, cross
 from ..progress import SILENT, Progress
 from ..rails import Kilometres
-from .stationing import Stationing, write_km
+from .stationing import Stationing
+from .text import write_km
 
 PIECE_M = 10.0
 """Longest part of a segment of the axis among which the nearest is sought, metres."""

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import ModelError, ParameterError
-from ..frpdf.models import FOLDER, load_arrays, save_arrays
+from ..frpdf.models import FOLDER
+from ..frpdf.weights import load_arrays, save_arrays
 from ..kernels import device_of, one_thread, pytorch
 from ..parameters import LEARNED
 from ..progress import SILENT, Progress

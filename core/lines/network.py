@@ -12,20 +12,12 @@ from .ends import Bridge, cut_back, turned
 
 @dataclass(frozen=True)
 class LineNetwork:
-    """Polylines in plan and the nodes in which they meet.
+    """Polylines in plan, (n, 2) local metres each, and the nodes, (k, 2), in which they meet.
 
-    A line end has the number 2 i for the start of line i and 2 i + 1 for its end.
-
-    Attributes
-    ----------
-    lines : tuple of (n, 2) arrays
-        Vertices in local metres; the first and the last are copies of their nodes.
-    nodes : (k, 2) array
-    ends : (m, 2) int array
-        Node at the start and at the end of each line. Every line end is a node. A node of degree 1 is a free end; a
-        closed line starts and ends in the same node.
-    passes : (p, 3) int array
-        Node, line and vertex number wherever a line passes through a node in which others end or which others cross.
+    A line end has the number 2 i for the start of line i and 2 i + 1 for its end; `ends`, (m, 2), are the nodes there,
+    of which the first and the last vertex are copies. Every line end is a node. A node of degree 1 is a free end; a
+    closed line starts and ends in the same node. `passes`, (p, 3), are node, line and vertex number wherever a line
+    passes through a node in which others end or which others cross.
     """
 
     lines: tuple[np.ndarray, ...]

@@ -14,7 +14,8 @@ from ..errors import ParameterError
 from ..frame import LocalFrame
 from ..frpdf.cleanup import MARGIN, clean, max_passes
 from ..frpdf.engine import Engine, make_engine
-from ..frpdf.models import choose, load_arrays
+from ..frpdf.models import choose
+from ..frpdf.weights import load_arrays
 from ..heads.elevation import ElevationParameters, elevate, flat_rail, flat_rails, numbered
 from ..heads.head_points import judged, near_lines
 from ..heads.refinement import refine

@@ -36,21 +36,10 @@ def vectorize(
 ) -> LineNetwork:
     """Turn rail cells into lines: one per rail, straight through junctions and across gaps (docs/method.md section 4).
 
-    Parameters
-    ----------
-    raster : RailRaster
-        Rail cells as cleaned by FRPDF.
-    head_width_m : float
-        Width of the railhead; smaller detail at junctions counts as noise.
-    max_gap_m, gap_angle_deg : float
-        Ends at most this far apart are joined if each points at the other within this angle.
-    min_length_m : float
-        Shorter lines are dropped unless they connect two junctions.
-
-    Returns
-    -------
-    LineNetwork
-        Lines in local metres that still have the stairs of the raster; smooth them next.
+    The cells are those that FRPDF has cleaned. Detail at junctions that is smaller than the width of the railhead
+    counts as noise. Ends at most `max_gap_m` apart are joined if each points at the other within `gap_angle_deg`. Lines
+    shorter than `min_length_m` are dropped unless they connect two junctions. The lines, in local metres, still have
+    the stairs of the raster; smooth them next.
     """
     closed = close(raster, progress.span(0.0, 0.3))
     cells = pixel_set(closed.cells())

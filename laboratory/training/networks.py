@@ -15,8 +15,8 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from ...core.frpdf.architecture import BASE, FAST, architecture_of
-from ...core.frpdf.models import load_arrays
 from ...core.frpdf.network import FRPDF, CustomConv2d, ProgressiveCombine2d, Recurrent, StackedConv2d, set_weights
+from ...core.frpdf.weights import load_arrays
 from .gradients import move, train_on_cpu
 
 CHANNELS, KERNEL_RADIUS, DILATIONS = BASE.channels, BASE.kernel_radius, BASE.dilations

@@ -22,8 +22,8 @@ from torch.nn import functional
 
 from ...core.errors import ParameterError
 from ...core.frpdf import DEFAULT_PASSES, OUTPUT_THRESHOLD, START, STATISTICS
-from ...core.frpdf.models import load_arrays, save_arrays
 from ...core.frpdf.network import PassBatchNorm2d, Recurrent, feedback, set_weights, weights_of
+from ...core.frpdf.weights import load_arrays, save_arrays
 from ..rasters.distortion import Pair
 from ..rasters.pairs import ratio_near, training_pair
 from .gradients import move, train_on_cpu

@@ -28,7 +28,7 @@ from ..scenes.raw_world import (
 from .draws import chosen, even_in_log, maybe, one_of, stream
 from .rails import lay
 from .railway import Railway
-from .surveys import FROM_ABOVE, IMAGES, TRIPOD
+from .surveys import FROM_ABOVE, TRIPOD
 
 BALLAST, SLAB, STREET = "ballast", "slab", "street"
 BEDS = {
@@ -80,7 +80,7 @@ class Surroundings:
 
 
 def draw_surroundings(seed: int, railway: Railway, survey: str) -> Surroundings:
-    """Draw what the tracks of a world lie in: no tunnel seen from above, no rails in images level with ballast."""
+    """Draw what the tracks of a world lie in: no tunnel and no rails level with ballast seen from above."""
     rng = stream(seed, "surroundings")
     bed = chosen(rng, BEDS[railway.family])
     if bed == STREET and not railway.plain:
@@ -128,7 +128,7 @@ def _bedding(rng: np.random.RandomState, railway: Railway, bed: str, survey: str
     height_m = RAIL_HEIGHT_M * railway.standard.head_width_m / 0.072
     fill = chosen(rng, {"tidy": 60, "thin": 15, "full": 17, "buried": 8})
     fills = {"tidy": (0.0, 0.05), "thin": (0.05, 0.11), "full": (-0.10, 0.0), "buried": (-height_m + 0.01, -0.10)}
-    if fill == "buried" and survey == IMAGES:
+    if fill == "buried" and survey in FROM_ABOVE:  # 1 cm of a head, blurred, is less than the stones
         fill = "full"
     timber = maybe(rng, 0.35)
     return Bedding(

@@ -16,7 +16,7 @@ from qgis.core import (
 
 from ...core.disk import Destination, scratch_folder
 from ...core.errors import RailExtractError
-from ...core.files.writing import tables_in
+from ...core.files.geopackage import tables_in
 from ..dialog.parameter_values import ParameterValues
 from .destinations import appends, output_file, table_of
 

@@ -76,7 +76,7 @@ def _make_weights(folder: Path) -> list[Path]:
 
 def _read_weights(path: Path) -> None:
     from rail_extract.core.frpdf.architecture import fold
-    from rail_extract.core.frpdf.models import load_arrays
+    from rail_extract.core.frpdf.weights import load_arrays
 
     fold(load_arrays(path))
 

@@ -1,13 +1,18 @@
 """Sharp or blunt, once per cloud."""
 
+from dataclasses import replace
 from typing import NamedTuple
 
+import numpy as np
 import pytest
-from rail_extract.core.classify.sharpness import search_alike
+from rail_extract.core.classify.settings import Settings
+from rail_extract.core.classify.sharpness import is_blunt, search_alike
+from rail_extract.core.classify.square import classify_square
 from rail_extract.core.rails import SearchFigures
 from rail_extract.laboratory.ruler.classification import lines_from, score, settings_of
 from rail_extract.laboratory.ruler.whole_clouds import classify_cloud
-from rail_extract.laboratory.scenes.raw_catalogue import RAW_SCENES
+from rail_extract.laboratory.scenes.raw_catalogue import DRONE, RAW_SCENES, double_track
+from scipy.special import ndtr
 
 
 class Found(NamedTuple):
@@ -46,6 +51,12 @@ def test_all_parts_are_searched_in_one_way(parts, blunt):
     assert ways(*parts) == [blunt] * len(parts)
 
 
+@pytest.mark.parametrize(("round_m", "unsure_m", "blunt"), [(157.0, 29.0, True), (5.0, 200.0, False)])
+def test_rails_that_may_be_of_either_show_a_sharp_cloud_unless_round_ones_are_longer(round_m, unsure_m, blunt):
+    """Grooves may be there by chance, and single metres of a rail may be round."""
+    assert is_blunt(SearchFigures(round_m=round_m, unsure_m=unsure_m)) == blunt
+
+
 def test_a_stray_piece_does_not_blunt_a_sharp_cloud():
     scene = RAW_SCENES["thin ballast"](1)
     found, rail = score(scene)
@@ -55,6 +66,29 @@ def test_a_stray_piece_does_not_blunt_a_sharp_cloud():
     assert lines.completeness > 0.99
     assert abs(lines.lateral_rmse_m) < 0.001
     assert abs(lines.height_rmse_m) < 0.001
+
+
+def test_images_that_blur_a_little_show_all_rails():
+    """Their tops are hardly wider than heads: a limit must not find one rail narrow enough, and the next too wide."""
+    found, _ = score(double_track(3, replace(DRONE, blur_m=0.032)))
+    assert found.figures.blunt_m > 200
+    assert found.recall > 0.99
+
+
+def test_the_blur_is_that_of_rails():
+    """Wide and steep things of a bridge blur less than rails, whose width is known."""
+    side_m = np.arange(0.0, 16.0, 0.05)
+    xy = np.array(np.meshgrid(side_m, side_m)).reshape(2, -1).T
+    rng = np.random.RandomState(4)
+    xy = xy + rng.uniform(-0.02, 0.02, xy.shape)
+    off_m = xy[:, :1] - np.array([5.0, 5.0 + 1.435 + 0.072])
+    rails_m = 0.13 * np.exp(-0.5 * (off_m / 0.062) ** 2).sum(axis=1)
+    wall_m = xy[:, :1] - np.array([2.5, 9.0])
+    walls_m = 0.32 * (ndtr((wall_m + 0.1) / 0.015) - ndtr((wall_m - 0.1) / 0.015)).sum(axis=1)
+    xyz = np.column_stack([xy, rails_m + walls_m + 0.004 * rng.standard_normal(len(xy))])
+    figures = classify_square(xyz, Settings((1.435,), 0.072, blunt=True)).figures
+    assert figures.blunt_m == pytest.approx(2 * 16.0, rel=0.1)
+    assert figures.blur_m == pytest.approx(0.062, rel=0.2)
 
 
 def test_a_blunt_cloud_is_blunt_everywhere():

@@ -109,6 +109,37 @@ def test_the_crest_of_a_slope_whose_far_side_is_hidden_is_not_a_lone_rail(slope,
     assert found.rail.any() == kept
 
 
+def test_a_rail_beside_a_shoulder_has_its_partner():
+    """The bed under the outer rail is 60 mm lower than under the inner one."""
+    rng = np.random.RandomState(15)
+    xyz, on = ballasted(rng)
+    outside = ~on & (turned(xyz, 0.3)[1] > SPACING / 2 - 0.35)
+    xyz[outside, 2] -= 0.06
+    figures = classify_square(xyz, SETTINGS).figures
+    assert figures.paired_m > 0.9 * (figures.paired_m + figures.single_m) > 9
+
+
+def test_ballast_up_to_the_heads_does_not_widen_them():
+    rng = np.random.RandomState(16)
+    xyz, on = ballasted(rng, per_m2=4000)
+    stone = (xyz[:, :2] / 0.05).astype(int) % 400
+    xyz[:, 2] = np.where(on, 0.05 + rng.normal(0, 0.002, len(xyz)), rng.normal(0, 0.013, (400, 400))[tuple(stone.T)])
+    found = classify_square(xyz, SETTINGS).rail
+    assert (found & on)[inner(xyz, 8)].sum() / on[inner(xyz, 8)].sum() > 0.9
+    assert (found & on).sum() / found.sum() > 0.9
+
+
+@pytest.mark.parametrize(("height_m", "kept"), [(0.09, True), (0.145, True), (0.11, False)])
+def test_a_lone_rail_stands_as_high_as_the_other_rails(height_m, kept):
+    rng = np.random.RandomState(17)
+    track, on = with_track(flat(16.0, rng=rng, per_m2=1200), GAUGE, WIDTH, 0.0)
+    track[on, 2] = 0.07
+    xyz, bar = with_bar(track, WIDTH, 0.0, 5.0, height_m)
+    found = classify_square(rough(xyz, rng, 0.005), SETTINGS).rail
+    assert (found & bar).any() == kept
+    assert (found & ~bar).any()
+
+
 def test_feet_and_webs_are_not_labelled():
     rng = np.random.RandomState(6)
     ground = flat(6.0, rng=rng, per_m2=3000)

@@ -11,8 +11,9 @@ shapely = pytest.importorskip("shapely")
 from rail_extract.core.disk import Destination  # noqa: E402
 from rail_extract.core.errors import DiskError  # noqa: E402
 from rail_extract.core.fields import CENTERLINE_FIELDS, CENTERLINES, QUALITY_FIELDS, RAIL_FIELDS, RAILS  # noqa: E402
+from rail_extract.core.files.geopackage import tables_in  # noqa: E402
 from rail_extract.core.files.layers import lines_layer, quality_layer  # noqa: E402
-from rail_extract.core.files.writing import tables_in, write_layers  # noqa: E402
+from rail_extract.core.files.writing import write_layers  # noqa: E402
 from rail_extract.core.frame import LocalFrame  # noqa: E402
 from rail_extract.core.rails import Centerline, RailLine, TrackGeometry  # noqa: E402
 

@@ -15,7 +15,8 @@ from rail_extract.core.frpdf import engine as engine_module
 from rail_extract.core.frpdf.cleanup import clean
 from rail_extract.core.frpdf.corridor import Rectangle, lay_batches
 from rail_extract.core.frpdf.engine import MAX_PIECE_CELLS, Engine, Step, make_engine
-from rail_extract.core.frpdf.models import MODELS, load_arrays
+from rail_extract.core.frpdf.models import MODELS
+from rail_extract.core.frpdf.weights import load_arrays
 from rail_extract.core.pipeline import Parameters
 from rail_extract.core.progress import SILENT
 from rail_extract.core.raster import RailRaster, cell_size, rasterize

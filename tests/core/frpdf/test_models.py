@@ -8,7 +8,8 @@ import pytest
 from rail_extract.core.errors import ModelError
 from rail_extract.core.frpdf.cleanup import clean
 from rail_extract.core.frpdf.engine import make_engine
-from rail_extract.core.frpdf.models import AUTOMATIC, MAX_BYTES, MODELS, choose, load_arrays, save_arrays
+from rail_extract.core.frpdf.models import AUTOMATIC, MODELS, choose
+from rail_extract.core.frpdf.weights import MAX_BYTES, load_arrays, save_arrays
 from rail_extract.core.raster import RailRaster
 from rail_extract.laboratory.rasters.pairs import BASE_RATIO, CELL_M, random_pair
 from rail_extract.laboratory.training.scores import Scores, score

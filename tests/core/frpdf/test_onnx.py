@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from rail_extract.core.frpdf import STATISTICS, onnx
 from rail_extract.core.frpdf.architecture import fold
-from rail_extract.core.frpdf.models import MODELS, load_arrays
+from rail_extract.core.frpdf.models import MODELS
+from rail_extract.core.frpdf.weights import load_arrays
 
 
 def run(net, raster, state):

@@ -14,6 +14,8 @@ from rail_extract.core.heads.strips import (
     rows_of,
 )
 from rail_extract.core.lines.network import LineNetwork
+from rail_extract.laboratory.scenes.scanner import Scanner, scan
+from rail_extract.laboratory.scenes.tracks import Railhead
 
 HEAD_M = 0.072
 LENGTH_M = 50.0
@@ -32,6 +34,21 @@ def rail(shifts, seed=0, per_m=150, noise_m=0.003, radius_m=600.0):
     x = np.arange(0.0, LENGTH_M + 0.1, 0.2)
     line = np.column_stack([x, x**2 / 2 / radius_m])
     return RailPoints(xyz, LocalFrame(np.zeros(3)), 10, np.concatenate(strips)), line
+
+
+def scanned(passes):
+    """Points of strips on a straight head of new shape, given (across, up, left of the scanner, height, points)."""
+    x = np.arange(0.0, LENGTH_M, 0.01)
+    line = np.column_stack([x, 0 * x, 0 * x])
+    head = Railhead(line, np.tile([0.0, 0.0, 1.0], (len(x), 1)), np.tile([0.0, 1.0, 0.0], (len(x), 1)))
+    rng, parts = np.random.RandomState(3), []
+    for across, up, left_m, height_m, count in passes:
+        seen = Scanner(noise_m=0.002, face_share=1.0, left_m=left_m, height_m=height_m, half_range_m=30.0)
+        points = scan(head, HEAD_M, line[::10], seen, rng)
+        kept = rng.choice(len(points), min(count, len(points)), replace=False)
+        parts.append(points[np.sort(kept)] + [0.0, across, up])
+    strips = np.repeat(np.arange(1, len(parts) + 1), [len(part) for part in parts]).astype(np.uint16)
+    return RailPoints(np.concatenate(parts), LocalFrame(np.zeros(3)), 10, strips), line[::20, :2]
 
 
 def strips_along(lines, points):
@@ -57,7 +74,26 @@ def test_strips_over_the_same_place_are_offset_from_their_mean(third):
     assert (found.count == len(shifts)).all()
     np.testing.assert_allclose(np.mean(found.spread_m), 0.020, atol=0.001)
     of_mean = 0.010 if not third else np.std([0.010, -0.010, 0.003]) / np.sqrt(2)
-    np.testing.assert_allclose(found.standard_error(found.across, aligned=True), of_mean, atol=0.0015)
+    np.testing.assert_allclose(found.standard_error(found.across, align=True), of_mean, atol=0.0015)
+
+
+def test_a_line_is_on_the_mean_of_overlapping_strips_however_dense_they_are():
+    points, line = scanned([(0.008, 0.006, 1.0, 3.0, 9000), (-0.008, -0.006, 0.5, 3.0, 3000)])
+    network = refine(single(line), points, HEAD_M)
+    near = near_lines(network.lines, points.xyz, HEAD_M, points.strips)
+    (one,) = elevate(network, near, 10, strips=[measure_strips(near[0])])
+    inner = one.xyz[(one.xyz[:, 0] > 3) & (one.xyz[:, 0] < LENGTH_M - 3)]
+    assert np.abs(inner[:, 1:].mean(axis=0)).max() < 0.001
+    assert np.abs(inner[:, 1:]).max() < 0.002
+    assert one.sigma_mm > 7
+
+
+def test_points_stay_where_strips_differ_because_each_sees_another_face():
+    points, line = scanned([(0.0, 0.0, 9.0, 1.2, 9000), (0.0, 0.0, -9.0, 1.2, 9000)])
+    (near,) = near_lines([line], points.xyz, HEAD_M, points.strips, blunt=False)
+    found = measure_strips(near)
+    assert np.abs(found.across).min() > 0.003
+    np.testing.assert_array_equal(found.moved(near).across, near.across)
 
 
 @pytest.mark.parametrize("overlap_m", [0.0, 12.0])
@@ -71,9 +107,9 @@ def test_strips_that_follow_each_other_are_compared_where_they_meet(overlap_m):
     np.testing.assert_allclose(found.up[:, at], [0.0075, -0.0075], atol=0.002)
     assert found.count[at] == 2 and found.count[3] == 1 and np.isnan(found.spread_m[3])
     # One strip alone errs by the distance of the other over the root of two.
-    as_they_are = found.standard_error(found.across, aligned=False)
+    as_they_are = found.standard_error(found.across, align=False)
     np.testing.assert_allclose(as_they_are[[3, -3]], 0.030 / np.sqrt(2), atol=0.0035)
-    assert as_they_are.min() > 0.012 and found.standard_error(found.across, aligned=True).min() > 0.012
+    assert as_they_are.min() > 0.012 and found.standard_error(found.across, align=True).min() > 0.012
 
 
 def test_aligned_lines_do_not_step_and_state_what_remains():

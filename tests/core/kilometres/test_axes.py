@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from rail_extract.core.kilometres.axes import AxisLine, AxisStart, Post, make_axes
 from rail_extract.core.kilometres.line import locate
-from rail_extract.core.kilometres.stationing import HECTOMETRES, Jump
+from rail_extract.core.kilometres.stationing import Jump
+from rail_extract.core.kilometres.text import HECTOMETRES
 
 
 def line(*x, m=None, name="", y=0.0):

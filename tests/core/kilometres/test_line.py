@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from rail_extract.core.kilometres.line import KilometreLine, locate
-from rail_extract.core.kilometres.stationing import HECTOMETRES, stationing_of
+from rail_extract.core.kilometres.stationing import stationing_of
+from rail_extract.core.kilometres.text import HECTOMETRES
 from rail_extract.core.polyline import length_along
 
 RADIUS_M = 500.0

@@ -5,17 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from rail_extract.core.errors import RailExtractError
-from rail_extract.core.kilometres.stationing import (
-    GERMAN,
-    HECTOMETRES,
-    KILOMETRES,
-    MILES,
-    NOTATIONS,
-    Jump,
-    read_km,
-    stationing_of,
-    write_km,
-)
+from rail_extract.core.kilometres.stationing import Jump, stationing_of
+from rail_extract.core.kilometres.text import GERMAN, HECTOMETRES, KILOMETRES, MILES, NOTATIONS, read_km, write_km
 
 
 def km_at(stationing, *s):

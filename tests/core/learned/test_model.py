@@ -5,7 +5,7 @@ import sys
 import numpy as np
 import pytest
 from rail_extract.core.errors import ModelError, ParameterError
-from rail_extract.core.frpdf.models import save_arrays
+from rail_extract.core.frpdf.weights import save_arrays
 from rail_extract.core.learned import model
 from rail_extract.core.learned.blocks import cut, thin
 from rail_extract.core.progress import Progress, Recording

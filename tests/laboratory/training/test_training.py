@@ -8,7 +8,7 @@ import pytest
 from rail_extract.core.errors import ParameterError
 from rail_extract.core.frpdf import STATISTICS
 from rail_extract.core.frpdf.architecture import fold
-from rail_extract.core.frpdf.models import load_arrays
+from rail_extract.core.frpdf.weights import load_arrays
 from rail_extract.laboratory.training.scores import score
 
 torch = pytest.importorskip("torch")
