@@ -16,8 +16,9 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import shapely
 from rail_extract.core.clearance.frame import Course, course_of
-from rail_extract.core.clearance.measure import Clearance, Settings, measure
+from rail_extract.core.clearance.measure import Clearance, measure
 from rail_extract.core.clearance.profiles import named
+from rail_extract.core.clearance.settings import Settings
 from rail_extract.core.clouds.points import ask
 from rail_extract.core.run.loop import Runner
 from rail_extract.laboratory.scenes import clearance as scenes
@@ -205,10 +206,8 @@ def things(seed: int, density: float, score: Score) -> None:
     order = np.argsort(s)
     s, v, w = (column[order][np.isfinite(s[order])] for column in (s, v, w))
     for wire in wires:
-        nodes = wire.nodes
-        score.wires += np.column_stack(
-            [1000 * (nodes.v - np.interp(nodes.s, s, v)), 1000 * (nodes.w - np.interp(nodes.s, s, w))]
-        ).tolist()
+        off = wire.v - np.interp(wire.s, s, v), wire.w - np.interp(wire.s, s, w)
+        score.wires += (1000 * np.column_stack(off)).tolist()
 
 
 if __name__ == "__main__":

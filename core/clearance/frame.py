@@ -13,7 +13,7 @@ import numpy as np
 from scipy.signal import savgol_filter
 from scipy.spatial import cKDTree
 
-from ..polyline import STATION_M, Chords, Polyline
+from ..polyline import STATION_M, Chords, Polyline, interpolate
 from ..rails import Centerline, RailLine
 
 STEP_M = 0.5
@@ -31,6 +31,9 @@ CELL_M = 1.0
 
 HALF_SPACING_M = 0.75
 """Distance of a rail's middle from the centerline where the gauge is not stated: that of standard gauge."""
+
+HEAD_M = 0.07
+"""Width of a head: the middles of rails are so much further apart than their gauge."""
 
 RAIL_REACH_M = 0.35
 """A rail is looked for within this distance of its expected place: less than half of the narrowest spacing, so that the
@@ -54,8 +57,7 @@ BESIDE_M = 0.5 * STEP_M
 MIN_LENGTH_M = 3.0
 """Shorter lines have no direction that could be measured."""
 
-
-BY_STATION = ("xyz", "heading", "curvature", "grade", "cant_m", "spacing_m", "bridged")
+BY_STATION = ("xyz", "heading", "curvature", "grade", "cant_m", "spacing_m", "bridged", "wide_m")
 """What a course has for each station."""
 
 
@@ -71,18 +73,17 @@ class Course:
         Stations, metres from the zero of the coordinate system.
     heading, curvature, grade : array
         Direction, radians; 1/m, positive to the left; slope, positive uphill.
-    cant_m : array
-        Left minus right rail top; 0 where there are no rails.
-    spacing_m : array
-        3D distance of both rail tops.
+    cant_m, spacing_m : array
+        Left minus right rail top, 0 where there are no rails; 3D distance of both.
     bridged : bool array
         Where a rail has no points and its height is interpolated.
-    gauge_m : float
-        Measured gauge, NaN if unknown.
-    sigma_m, cant_sigma_m : float
-        Standard errors of the line across and of the cant; where the cant is unknown, that of the cant holds all of it.
-    noise_m : float
-        Noise of a point.
+    wide_m : (n, 2) array
+        What the profile is widened by on the left and on the right.
+    gauge_m, beside_m : float, (float, float)
+        Measured gauge; median distances of the left and of the right rail from the line. NaN if unknown.
+    sigma_m, cant_sigma_m, noise_m : float
+        Standard errors of the line across, of the cant, and of a point. Where the cant is unknown, its error holds all
+        of it.
     has_cant : bool
         Whether rails give the cant.
     first : int
@@ -98,7 +99,9 @@ class Course:
     cant_m: np.ndarray
     spacing_m: np.ndarray
     bridged: np.ndarray
+    wide_m: np.ndarray
     gauge_m: float
+    beside_m: tuple[float, float]
     sigma_m: float
     cant_sigma_m: float
     noise_m: float
@@ -127,8 +130,7 @@ class Course:
 
     def at(self, s: np.ndarray, values: np.ndarray) -> np.ndarray:
         """Return values of the stations, (n,) or (n, d), at chainages."""
-        columns = [np.interp(s, self.s, column) for column in np.atleast_2d(values.T)]
-        return columns[0] if values.ndim == 1 else np.column_stack(columns)
+        return np.interp(s, self.s, values) if values.ndim == 1 else interpolate(values, self.s, s)
 
     def station(self, s: np.ndarray) -> np.ndarray:
         """Return the number of the station nearest to chainages."""
@@ -184,11 +186,13 @@ def course_of(line: Centerline, rails: Sequence[RailLine]) -> Course:
     xyz, step_m = own.xyz, own.length_m / (len(own.xyz) - 1)
     direction = _slope(xyz[:, :2], DIRECTION_M, 2, step_m)
     heading = np.unwrap(np.arctan2(direction[:, 1], direction[:, 0]))
-    spacing_m = _expected_spacing(line)
-    cant_m, wide_m, bridged = _cant(xyz, heading, rails, spacing_m)
-    known = np.isfinite(cant_m)
-    has_cant = bool(known.any())
+    spacing_m = line.gauge_mm / 1000 + HEAD_M if np.isfinite(line.gauge_mm) else 2 * HALF_SPACING_M
+    feet, bridged = _feet(xyz, heading, rails, spacing_m)
+    between = feet[0] - feet[1]
+    has_cant = bool(np.isfinite(between).any())
     doubt_m = line.cantmax_mm / 1000 if np.isfinite(line.cantmax_mm) else UNKNOWN_CANT_M
+    cant_sigma_m = _mean_error([rail.sigmaz_mm for rail in rails], CANT_SIGMA_M, 2**0.5)
+    left_m, right_m = (_median(np.hypot(*(one - xyz)[:, :2].T)) for one in feet)
     return Course(
         track_id=line.track_id,
         step_m=step_m,
@@ -196,22 +200,17 @@ def course_of(line: Centerline, rails: Sequence[RailLine]) -> Course:
         heading=heading,
         curvature=_slope(heading[:, None], CURVATURE_M, 1, step_m)[:, 0],
         grade=_slope(xyz[:, 2:], DIRECTION_M, 1, step_m)[:, 0],
-        cant_m=_filled(own.t, cant_m, 0.0),
-        spacing_m=_filled(own.t, wide_m, spacing_m),
+        cant_m=_filled(own.t, between[:, 2], 0.0),
+        spacing_m=_filled(own.t, np.linalg.norm(between, axis=1), spacing_m),
         bridged=bridged,
+        wide_m=np.zeros((len(xyz), 2)),
         gauge_m=line.gauge_mm / 1000,
+        beside_m=(left_m, right_m),
         sigma_m=_mean_error([rail.sigma_mm for rail in rails], LINE_SIGMA_M, 0.5**0.5),
-        cant_sigma_m=np.hypot(
-            0.0 if has_cant else doubt_m, _mean_error([r.sigmaz_mm for r in rails], CANT_SIGMA_M, 2**0.5)
-        ),
+        cant_sigma_m=cant_sigma_m if has_cant else float(np.hypot(doubt_m, cant_sigma_m)),
         noise_m=max(_mean_error([rail.resid_mm for rail in rails], USUAL_NOISE_M), LEAST_NOISE_M),
         has_cant=has_cant,
     )
-
-
-def _expected_spacing(line: Centerline) -> float:
-    """Return the distance of the rails' middles that the gauge of a line leads to."""
-    return 2 * HALF_SPACING_M if not np.isfinite(line.gauge_mm) else line.gauge_mm / 1000 + 0.07
 
 
 def _slope(values: np.ndarray, length_m: float, order: int, step_m: float) -> np.ndarray:
@@ -220,37 +219,26 @@ def _slope(values: np.ndarray, length_m: float, order: int, step_m: float) -> np
     return savgol_filter(values, window, min(order, window - 1), deriv=1, delta=step_m, axis=0, mode="interp")
 
 
-def _cant(
+def _feet(
     xyz: np.ndarray, heading: np.ndarray, rails: Sequence[RailLine], spacing_m: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return cant and spacing, NaN where a rail is missing, and where one has no points; (n,) each."""
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the places of the left and of the right rail, (2, n, 3), NaN without one, and where one has no points."""
+    feet, bridged = np.full((2, len(xyz), 3), np.nan), np.zeros(len(xyz), dtype=bool)
+    chords = Chords.of([rail.line for rail in rails], STATION_M)
+    if not len(chords.first):
+        return feet, bridged
     left = np.column_stack([-np.sin(heading), np.cos(heading)])
-    chords = Chords.of([rail.line for rail in rails], STATION_M)
-    if not rails or not len(chords.first):
-        return (*np.full((2, len(xyz)), np.nan), np.zeros(len(xyz), dtype=bool))
-    feet, hidden = [], np.zeros(len(xyz), dtype=bool)
-    for side in (1.0, -1.0):
-        place, foot, t = chords.meet(xyz[:, :2], side * left, spacing_m / 2, RAIL_REACH_M)
-        feet.append(foot)
-        number = chords.line[place]
+    for side, sense in enumerate((1.0, -1.0)):
+        place, feet[side], t = chords.meet(xyz[:, :2], sense * left, spacing_m / 2, RAIL_REACH_M)
         for at, rail in enumerate(rails):
-            gaps = rail.gaps.ravel()
-            hidden |= (number == at) & (np.searchsorted(gaps, t) % 2 == 1) if len(gaps) else False
-    between = feet[0] - feet[1]
-    missing = ~np.isfinite(between).all(axis=1)
-    return between[:, 2], np.linalg.norm(between, axis=1), hidden | missing
+            bridged |= (chords.line[place] == at) & (np.searchsorted(rail.gaps.ravel(), t) % 2 == 1)
+    return feet, bridged | ~np.isfinite(feet).all(axis=(0, 2))
 
 
-def rail_offsets(course: Course, rails: Sequence[RailLine]) -> tuple[float, float]:
-    """Return the median distances of the left and of the right rail from a centerline; NaN where there is none."""
-    chords = Chords.of([rail.line for rail in rails], STATION_M)
-    left = np.column_stack([-np.sin(course.heading), np.cos(course.heading)])
-    found = []
-    for side in (1.0, -1.0):
-        _, foot, _ = chords.meet(course.xyz[:, :2], side * left, float(np.median(course.spacing_m)) / 2, RAIL_REACH_M)
-        away = np.hypot(*(foot[:, :2] - course.xyz[:, :2]).T)
-        found.append(float(np.nanmedian(away)) if np.isfinite(away).any() else np.nan)
-    return found[0], found[1]
+def _median(values: np.ndarray) -> float:
+    """Return the median of the values, (n,), that are known; NaN if none is."""
+    known = values[np.isfinite(values)]
+    return float(np.median(known)) if len(known) else np.nan
 
 
 def _filled(t: np.ndarray, values: np.ndarray, default: float) -> np.ndarray:
@@ -267,41 +255,33 @@ def _mean_error(values_mm: Sequence[float], default_m: float, factor: float = 1.
 
 @dataclass(frozen=True)
 class Cells:
-    """Cells around a track, each with its nearest station.
-
-    Attributes
-    ----------
-    number : (m,) int array
-        Of the cells, rising, see `numbers`.
-    station : (m,) int array
-    """
+    """Cells around a track: their numbers, rising, and the station nearest to each, (m,) each."""
 
     number: np.ndarray
     station: np.ndarray
 
     @classmethod
-    def around(cls, course: Course, reach_m: float, between: tuple[float, float] = (0.0, np.inf)) -> Cells:
-        """Return the cells within reach of a track, or of its part between two chainages."""
-        inside = np.flatnonzero((course.s >= between[0] - STEP_M) & (course.s <= between[1] + STEP_M))
-        xy = course.xyz[inside, :2]
+    def around(cls, course: Course, reach_m: float) -> Cells:
+        """Return the cells within reach of a track."""
+        xy = course.xyz[:, :2]
         steps = np.arange(-int(np.ceil(reach_m / CELL_M)), int(np.ceil(reach_m / CELL_M)) + 1)
         block = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
         cells = np.unique(np.floor(xy / CELL_M).astype(np.int64), axis=0)
         cells = np.unique((cells[:, None] + block).reshape(-1, 2), axis=0)
         away, nearest = cKDTree(xy).query((cells + 0.5) * CELL_M, distance_upper_bound=reach_m + CELL_M)
         near = np.isfinite(away)
-        number = numbers(cells[near])
+        number = _numbers(cells[near])
         order = np.argsort(number)
-        return cls(number[order], inside[nearest[near]][order])
+        return cls(number[order], nearest[near][order])
 
     def find(self, xy: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return which points, (m, 2), are within reach, and the stations near these."""
-        number = numbers(np.floor(xy / CELL_M).astype(np.int64))
+        number = _numbers(np.floor(xy / CELL_M).astype(np.int64))
         at = np.minimum(np.searchsorted(self.number, number), len(self.number) - 1)
         near = np.flatnonzero(self.number[at] == number)
         return near, self.station[at[near]]
 
 
-def numbers(cells: np.ndarray) -> np.ndarray:
+def _numbers(cells: np.ndarray) -> np.ndarray:
     """Return a number for each cell, given by column and row, (m, 2)."""
     return cells[:, 0] * 2**31 + cells[:, 1]

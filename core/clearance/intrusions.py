@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,7 +11,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from .frame import Course
-from .parts import PLATFORM, WIRE, Part, Parts
+from .parts import PLATFORM, WIRE, Part
 from .surface import Surface
 from .vehicles import vehicle_on
 from .wires import ARMS_M
@@ -34,12 +34,8 @@ the bend of a pole."""
 class Intrusion:
     """An object inside the profile of a track; its attributes are the fields of the layer, lengths in their units.
 
-    Attributes
-    ----------
-    course : int
-        Number of the track among the courses.
-    xyz : (3,) array
-        The worst place, metres from the zero of the coordinate system.
+    `course` is the number of the track among the courses, and `xyz`, (3,), the worst place, metres from the zero of the
+    coordinate system.
     """
 
     course: int
@@ -75,92 +71,75 @@ class Intrusion:
         return bool(self.sure) and not self.what
 
 
-def intrusions_of(courses: Sequence[Course], found: Mapping[tuple[int, int], Parts]) -> list[Intrusion]:
-    """Join the parts of all sections, by track and section, into objects, the deepest sure one first."""
-    made = [one for number, course in enumerate(courses) for one in _of_course(number, course, found)]
+def intrusions_of(courses: Sequence[Course], parts: Sequence[Sequence[Part]]) -> list[Intrusion]:
+    """Join the parts in the profile of each track into objects, the deepest sure one first."""
+    made = []
+    for number, own in enumerate(parts):
+        for group in _groups(own):
+            surface = _deepest([one for at in group for one in own[at].surfaces])
+            if surface.depth_m > 0:
+                made.append(_object(number, courses[number], [own[at] for at in group], surface))
     made.sort(key=lambda one: (bool(one.what), -one.sure, -one.pen_mm, one.track_id, one.chainage_m))
     return [replace(one, intrusion=number) for number, one in enumerate(made, start=1)]
 
 
-def _of_course(number: int, course: Course, found: Mapping[tuple[int, int], Parts]) -> Iterator[Intrusion]:
-    """Yield the objects in the profile of one track."""
-    mine = {section: parts for (track, section), parts in sorted(found.items()) if track == number}
-    parts = [one for own in mine.values() for one in own.parts]
-    for group in _groups(mine):
-        one = _object(number, course, [parts[at] for at in group])
-        if one is not None:
-            yield one
-
-
-def _groups(sections: Mapping[int, Parts]) -> list[list[int]]:
-    """Return the numbers of the parts of each object: those of two sections that name the same cell are one."""
-    first, total = {}, 0
-    for section, own in sections.items():
-        first[section], total = total, total + len(own.parts)
-    pairs = []
-    for section, own in sections.items():
-        ahead = dict(sections[section + 1].seams) if section + 1 in sections else {}
-        pairs += [(first[section] + at, first[section + 1] + ahead[cell]) for cell, at in own.seams if cell in ahead]
-    if not total:
-        return []
+def _groups(parts: Sequence[Part]) -> list[np.ndarray]:
+    """Return the numbers of the parts of each object: those that name the same cell are one."""
+    first: dict[tuple[int, ...], int] = {}
+    pairs = [(first.setdefault(cell, at), at) for at, part in enumerate(parts) for cell in part.seam]
     rows, columns = np.reshape(pairs, (-1, 2)).astype(np.int64).T
-    graph = coo_matrix((np.ones(len(rows)), (rows, columns)), shape=(total, total))
-    count, labels = connected_components(graph, directed=False)
-    return [np.flatnonzero(labels == one).tolist() for one in range(count)]
+    graph = coo_matrix((np.ones(len(rows)), (rows, columns)), shape=(len(parts), len(parts)))
+    count, labels = connected_components(graph, directed=False) if parts else (0, np.empty(0))
+    return [np.flatnonzero(labels == one) for one in range(count)]
 
 
-def _object(number: int, course: Course, parts: Sequence[Part]) -> Intrusion | None:
-    """Return the object that parts make; None if its surface is not inside."""
-    surface = _deepest([one for part in parts for one in part.surfaces])
-    if surface is None or surface.depth_m <= 0:
-        return None
+def _object(number: int, course: Course, parts: Sequence[Part], surface: Surface) -> Intrusion:
+    """Return the object that parts make."""
     codes = sum((part.codes for part in parts), Counter())
-    s, w = ((min(getattr(p, n)[0] for p in parts), max(getattr(p, n)[1] for p in parts)) for n in ("s", "w"))
-    line_m = float(course.sigma_at(np.array([surface.w]), np.array([surface.s]))[0])
-    sigma_m = float(np.hypot(surface.sigma_m, line_m))
-    place = [np.array([value]) for value in (surface.s, surface.v, surface.w)]
+    low, high = np.min([part.low for part in parts], axis=0), np.max([part.high for part in parts], axis=0)
+    s, v, w = (np.array([value]) for value in (surface.s, surface.v, surface.w))
+    sigma_m = float(np.hypot(surface.sigma_m, course.sigma_at(w, s)[0]))
     return Intrusion(
         course=number,
         track_id=course.track_id,
-        from_m=s[0],
-        to_m=s[1],
+        from_m=float(low[0]),
+        to_m=float(high[0]),
         chainage_m=surface.s,
         v_mm=1000 * surface.v,
         w_mm=1000 * surface.w,
-        wmin_mm=1000 * w[0],
-        wmax_mm=1000 * w[1],
+        wmin_mm=1000 * float(low[2]),
+        wmax_mm=1000 * float(high[2]),
         pen_mm=1000 * surface.depth_m,
         raw_mm=1000 * max(part.raw_m for part in parts),
         sigma_mm=1000 * sigma_m,
         sure=int(surface.is_sure and surface.depth_m > SURE_SIGMAS * sigma_m),
-        points=sum(part.points for part in parts),
+        points=sum(codes.values()),
         class_code=max(codes, key=lambda code: (codes[code], -code)),
-        what=_what(course, parts, s, w),
-        xyz=course.places(*place)[0],
+        what=_what(course, parts, low, high),
+        xyz=course.places(s, v, w)[0],
     )
 
 
-def _what(course: Course, parts: Sequence[Part], s: tuple[float, float], w: tuple[float, float]) -> str:
+def _what(course: Course, parts: Sequence[Part], low: np.ndarray, high: np.ndarray) -> str:
     """Return what an object is, in words; empty if that is not known."""
     kind = parts[0].kind
     if kind == PLATFORM:
         return PLATFORM_WORDS
-    if kind == WIRE or (w[0] > ARMS_M and any(part.live for part in parts)):
+    if kind == WIRE or (low[2] > ARMS_M and any(part.is_live for part in parts)):
         return WIRE_WORDS
     boxes = sum((part.boxes for part in parts), Counter())
-    track = vehicle_on(boxes, course.track_id, s[1] - s[0], w[1] - w[0])
+    length_m, _, height_m = (high - low).tolist()
+    track = vehicle_on(boxes, course.track_id, length_m, height_m)
     return "" if track is None else VEHICLE_WORDS.format(track)
 
 
-def _deepest(surfaces: Sequence[Surface]) -> Surface | None:
+def _deepest(surfaces: Sequence[Surface]) -> Surface:
     """Return the deepest surface of an object.
 
     The deepest of many places that are equally deep is so by chance. Places are therefore joined from the deepest on,
     as long as the next one agrees with the mean of those before.
     """
-    sure = [one for one in surfaces if one.is_sure] or list(surfaces)
-    if not sure:
-        return None
+    sure = [one for one in surfaces if one.is_sure] or surfaces
     best, *others = sorted(sure, key=lambda one: -one.depth_m)
     depth_m, weight = best.depth_m, 1.0 / best.sigma_m**2
     for one in others:

@@ -10,6 +10,7 @@ from scipy.spatial import cKDTree
 
 from ..polyline import runs
 from .frame import STEP_M, Course
+from .settings import Settings
 
 REACH_M = 8.0
 """Between tracks further apart there is room for another one."""
@@ -23,12 +24,7 @@ JOINED_M, APART_M = 2.5, 3.5
 ERROR_M = 0.002
 """Error of a distance between two measured lines: tracks that are built at the least distance are not too near."""
 
-EBO_DISTANCE_M = 4.0
-"""Least distance of tracks on the open line (EBO section 10)."""
-
-TIGHT_M = np.array(
-    [[250, 0], [225, 0.055], [200, 0.120], [180, 0.180], [170, 0.215], [150, 0.305], [120, 0.700], [100, 1.100]]
-)
+TIGHT_M = (100, 120, 150, 170, 180, 200, 225, 250), (1.100, 0.700, 0.305, 0.215, 0.180, 0.120, 0.055, 0.0)
 """Radius, and what the least distance grows by there, metres (EBO annex 4)."""
 
 CANT_LEVER = 3.53 / 1.50
@@ -40,16 +36,8 @@ the outer track has more cant (EBO annex 4)."""
 class Side:
     """The nearest neighbour on one side of a track, by station; (n,) arrays, NaN where there is none.
 
-    Attributes
-    ----------
-    distance_m, above_m : array
-        In plan, and how much higher the neighbour's track is.
-    track : int array
-        Its number among the courses, -1 where there is none.
-    least_m : array
-        Least distance that is required.
-    judged : bool array
-        Whether the distance is judged: not where the tracks join.
+    Distance in plan, how much higher the neighbour's track is, its number among the courses, -1 where there is none,
+    the least distance that is required, and whether the distance is judged: not where the tracks join.
     """
 
     distance_m: np.ndarray
@@ -71,75 +59,62 @@ class Side:
         return self.judged & (self.distance_m < self.least_m - ERROR_M)
 
 
-def neighbours(courses: Sequence[Course], number: int, least_m: float, is_of_ebo: bool) -> tuple[Side, Side]:
-    """Return the neighbours of a track on the left and on the right.
-
-    Parameters
-    ----------
-    least_m : float
-        Required distance; NaN if none is.
-    is_of_ebo : bool
-        Whether the additions for tight curves and cant apply.
-    """
+def neighbours(courses: Sequence[Course], number: int, settings: Settings) -> tuple[Side, Side]:
+    """Return the neighbours of a track on the left and on the right."""
     own = courses[number]
-    best = [[np.full(len(own.xyz), np.nan), np.full(len(own.xyz), np.nan), np.full(len(own.xyz), -1)] for _ in "lr"]
+    best = np.full((2, 4, len(own.xyz)), np.nan)
     for at, other in enumerate(courses):
-        if at == number or not _touch(own, other):
-            continue
-        left, above = distances(own, other)
-        for side, sense in zip(best, (1.0, -1.0)):
-            with np.errstate(invalid="ignore"):
-                nearer = (sense * left > 0) & ~(sense * left >= side[0])
-            side[0][nearer], side[1][nearer], side[2][nearer] = sense * left[nearer], above[nearer], at
-    return tuple(_judged(own, courses, one, least_m, is_of_ebo) for one in best)  # type: ignore[return-value]
+        if at != number and near(own, other):
+            left_m, *more = _beside(own, other)
+            for side, sense in zip(best, (1.0, -1.0)):
+                with np.errstate(invalid="ignore"):
+                    nearer = (sense * left_m > 0) & ~(sense * left_m >= side[0])
+                side[:, nearer] = np.array([sense * left_m, *more, np.full(len(left_m), at)])[:, nearer]
+    left, right = (_judged(own, side, settings) for side in best)
+    return left, right
 
 
-def distances(course: Course, other: Course) -> tuple[np.ndarray, np.ndarray]:
-    """Return how far another track is to the left, and above, at the stations, (n,) each; NaN where it is not near."""
-    away, nearest = cKDTree(other.xyz[:, :2]).query(course.xyz[:, :2], distance_upper_bound=REACH_M + STEP_M)
-    near = np.flatnonzero(np.isfinite(away))
-    same = np.cos(course.heading[near] - other.heading[nearest[near]])
-    near, same = (one[np.abs(same) > np.cos(np.radians(PARALLEL_DEG))] for one in (near, same))
-    left, above = np.full((2, len(course.xyz)), np.nan)
-    if len(near):
-        s, _, _ = other.located(course.xyz[near], nearest[near])
-        _, across = other.on_arc(course.xyz[near], other.station(np.nan_to_num(s)))
-        is_beside = np.isfinite(s) & (np.abs(across) <= REACH_M)
-        left[near] = np.where(is_beside, -across * np.sign(same), np.nan)
-        above[near] = np.where(is_beside, np.interp(s, other.s, other.xyz[:, 2]) - course.xyz[near, 2], np.nan)
-    return left, above
+def near(own: Course, other: Course) -> Course | None:
+    """Return the part of another track that is near a track; None if none is."""
+    low, high = own.xyz[:, :2].min(axis=0) - REACH_M, own.xyz[:, :2].max(axis=0) + REACH_M
+    inside = np.flatnonzero(((other.xyz[:, :2] >= low) & (other.xyz[:, :2] <= high)).all(axis=1))
+    return other.part(int(inside[0]), int(inside[-1]) + 1) if len(inside) > 1 else None
 
 
-def _touch(one: Course, other: Course) -> bool:
-    """Return whether the rectangles of two tracks come near each other."""
-    low, high = one.xyz[:, :2].min(axis=0) - REACH_M, one.xyz[:, :2].max(axis=0) + REACH_M
-    return bool((other.xyz[:, :2].max(axis=0) >= low).all() and (other.xyz[:, :2].min(axis=0) <= high).all())
+def _beside(own: Course, other: Course) -> np.ndarray:
+    """Return how far another track is to the left, how far above, and how much more cant the outer one of both has.
+
+    (3, n) metres at the stations of the first; NaN where the other one is not near. The cant is 0 where the outer track
+    has less.
+    """
+    found = np.full((3, len(own.xyz)), np.nan)
+    away, nearest = cKDTree(other.xyz[:, :2]).query(own.xyz[:, :2], distance_upper_bound=REACH_M + STEP_M)
+    mine = np.flatnonzero(np.isfinite(away))
+    same = np.cos(own.heading[mine] - other.heading[nearest[mine]])
+    mine, same = (one[np.abs(same) > np.cos(np.radians(PARALLEL_DEG))] for one in (mine, same))
+    if len(mine):
+        s, _, _ = other.located(own.xyz[mine], nearest[mine])
+        theirs = other.station(np.nan_to_num(s))
+        _, across = other.on_arc(own.xyz[mine], theirs)
+        above = np.interp(s, other.s, other.xyz[:, 2]) - own.xyz[mine, 2]
+        more = np.abs(other.cant_m[theirs]) - np.abs(own.cant_m[mine])
+        is_outside = np.abs(other.curvature[theirs]) < np.abs(own.curvature[mine])
+        rows = np.array([-across * np.sign(same), above, np.maximum(np.where(is_outside, more, -more), 0.0)])
+        found[:, mine] = np.where(np.isfinite(s) & (np.abs(across) <= REACH_M), rows, np.nan)
+    return found
 
 
-def _judged(own: Course, courses: Sequence[Course], side: list[np.ndarray], least_m: float, is_of_ebo: bool) -> Side:
-    """Return a side with the distance that is required."""
-    distance_m, above_m, track = side
-    needed = np.full(len(own.xyz), least_m)
-    if is_of_ebo:
-        radius_m = 1.0 / np.maximum(np.abs(own.curvature), 1e-9)
-        needed = needed + np.interp(radius_m, TIGHT_M[::-1, 0], TIGHT_M[::-1, 1])
-        needed = needed + CANT_LEVER * _more_cant_outside(own, courses, track)
+def _judged(own: Course, side: np.ndarray, settings: Settings) -> Side:
+    """Return a side, given distance, height, cant and number of the neighbour, (4, n), with what is required."""
+    distance_m, above_m, more_cant_m, track = side
+    needed = np.full(len(own.xyz), settings.least_distance_m)
+    if settings.profile.is_of_ebo:
+        tight_m = np.interp(1.0 / np.maximum(np.abs(own.curvature), 1e-9), *TIGHT_M)
+        needed = needed + tight_m + CANT_LEVER * np.nan_to_num(more_cant_m)
     with np.errstate(invalid="ignore"):
-        joined, apart = distance_m < JOINED_M, ~(distance_m < APART_M)
+        joined, close = distance_m < JOINED_M, distance_m < APART_M
     judged = np.isfinite(distance_m) & np.isfinite(needed)
-    for first, last in runs(~apart):
+    for first, last in runs(close):
         if joined[first : last + 1].any():
             judged[first : last + 1] = False
-    return Side(distance_m, above_m, track, needed, judged)
-
-
-def _more_cant_outside(own: Course, courses: Sequence[Course], track: np.ndarray) -> np.ndarray:
-    """Return how much more cant the outer one of two tracks has, (n,) metres; 0 where it has less or none is near."""
-    found = np.zeros(len(own.xyz))
-    for at in np.unique(track[track >= 0]):
-        mine, other = track == at, courses[at]
-        _, nearest = cKDTree(other.xyz[:, :2]).query(own.xyz[mine, :2])
-        theirs, ours = np.abs(other.cant_m[nearest]), np.abs(own.cant_m[mine])
-        is_outside = np.abs(other.curvature[nearest]) < np.abs(own.curvature[mine])
-        found[mine] = np.maximum(np.where(is_outside, theirs - ours, ours - theirs), 0.0)
-    return found
+    return Side(distance_m, above_m, np.nan_to_num(track, nan=-1).astype(np.int64), needed, judged)

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from scipy.ndimage import label
 from scipy.spatial import cKDTree
 
 from .frame import Course
-from .outline import Outline
-from .surface import ALONG_M, DEEPEST, Depth, Surface, surface_of
+from .settings import Settings
+from .surface import ALONG_M, DEEPEST, Surface, surface_of
 from .vehicles import in_boxes
+from .wires import LIVE_M, away
 
 OTHER, PLATFORM, WIRE = range(3)
 """What a point is of; parts are of one kind."""
@@ -38,98 +40,92 @@ deepest piece is not the deepest one."""
 SEAM_M = 3 * CELL_M
 """Length on both sides of the border of two sections in which both name the cells of their parts."""
 
-Cell = tuple[int, int, int, int]
+
+@dataclass(frozen=True)
+class Points:
+    """Points of a section in the order of s.
+
+    Attributes
+    ----------
+    place : (n, 3) array
+        s, v and w.
+    depth : (n,) array
+        Penetration of the profile, margin and widening included.
+    code, kind : (n,) int array
+        Class, and what they are of, see `OTHER`.
+    is_own : (n,) bool array
+        Whether a point is in the section itself, not in the halo.
+    number : (n,) int array
+        Points of the cloud that each stands for.
+    """
+
+    place: np.ndarray
+    depth: np.ndarray
+    code: np.ndarray
+    is_own: np.ndarray
+    kind: np.ndarray
+    number: np.ndarray
+
+    def kept(self, which: np.ndarray) -> Points:
+        """Return some of the points."""
+        return Points(*(column[which] for column in vars(self).values()))
 
 
-@dataclass
+@dataclass(frozen=True)
 class Part:
     """What a section shows of one object; lengths in metres.
 
     Attributes
     ----------
     kind : int
-    s, w : tuple of float
-        Least and largest of the points inside.
-    points : int
-        Points inside.
-    raw : tuple of float
+    low, high : (3,) array
+        Least and largest s, v and w of the points inside.
+    raw_m : float
         Penetration of the deepest point.
-    codes : Counter
-        Points by class.
-    boxes : Counter
-        Points in the space of a vehicle on a track, by the number of the track; and all that were looked at, by -1.
-    live : bool
+    codes, boxes : Counter
+        Points by class; and in the spaces of vehicles, see `vehicles.in_boxes`.
+    is_live : bool
         Whether a point is so near to the contact wire that the object is live itself.
-    surfaces : list of Surface
+    surfaces : tuple of Surface
+    seam : frozenset
+        Kind and numbers of the cells by which the object continues in another section.
     """
 
     kind: int
-    s: tuple[float, float]
-    w: tuple[float, float]
-    points: int
+    low: np.ndarray
+    high: np.ndarray
     raw_m: float
-    codes: Counter[int] = field(default_factory=Counter)
-    boxes: Counter[int] = field(default_factory=Counter)
-    live: bool = False
-    surfaces: list[Surface] = field(default_factory=list)
-
-
-@dataclass(frozen=True)
-class Parts:
-    """The parts of objects in a section, and the cells by which they continue in the next ones."""
-
-    parts: tuple[Part, ...] = ()
-    seams: tuple[tuple[Cell, int], ...] = ()
-
-
-@dataclass(frozen=True)
-class Inside:
-    """Points near the profile; see `section.Points`."""
-
-    place: np.ndarray
-    depth: np.ndarray
-    code: np.ndarray
-    kind: np.ndarray
-    is_own: np.ndarray
-    away_m: np.ndarray
+    codes: Counter[int]
+    boxes: Counter[int]
+    is_live: bool
+    surfaces: tuple[Surface, ...]
+    seam: frozenset[tuple[int, ...]]
 
 
 def parts_of(
-    near: Inside, courses: Sequence[Course], ends: tuple[float, float], outline: Outline, depth_at: Depth
-) -> Parts:
-    """Return the parts of objects in a section.
+    points: Points, nodes: np.ndarray, courses: Sequence[Course], ends: tuple[float, float], settings: Settings
+) -> list[Part]:
+    """Return the parts of objects in a section, which ends at two chainages.
 
-    Parameters
-    ----------
-    near : Inside
-        Points at most `AROUND_M` outside of the profile, in the order of s.
-    courses : sequence of Course
-        The track first, then those around it.
-    ends : tuple of float
-        Chainages at which the section begins and ends.
+    Given are the places of the wire, the track, and those around it.
     """
+    near = points.kept(points.depth > -AROUND_M)
     inside = np.flatnonzero(near.depth > 0)
     if not len(inside):
-        return Parts()
+        return []
     reach, _ = cKDTree(near.place).query(near.place[inside], k=[TOGETHER], distance_upper_bound=TOGETHER_M)
     inside = inside[np.isfinite(reach[:, 0])]
-    parts: list[Part] = []
-    seams: list[tuple[Cell, int]] = []
+    found = []
     for kind in np.unique(near.kind[inside]).tolist():
         mine = inside[near.kind[inside] == kind]
         cells = np.floor(near.place[mine] / CELL_M).astype(np.int64)
         labels = labelled(cells)
         at_seam = np.abs(near.place[mine, :1] - ends).min(axis=1) <= SEAM_M
-        numbers: dict[int, int] = {}
-        for one in np.unique(labels).tolist():
-            chosen = mine[labels == one]
-            own = chosen[near.is_own[chosen]]
-            if len(own):
-                numbers[one] = len(parts)
-                parts.append(_part(near, own, kind, courses, outline, depth_at))
-        named = np.unique(np.column_stack([cells, labels])[at_seam], axis=0)
-        seams += [((kind, *row[:3]), numbers[row[3]]) for row in named.tolist() if row[3] in numbers]
-    return Parts(tuple(parts), tuple(seams))
+        for one in np.unique(labels[near.is_own[mine]]).tolist():
+            seam = frozenset((kind, *cell) for cell in cells[at_seam & (labels == one)].tolist())
+            own = mine[(labels == one) & near.is_own[mine]]
+            found.append(_part(near, own, kind, seam, nodes, courses, settings))
+    return found
 
 
 def labelled(cells: np.ndarray) -> np.ndarray:
@@ -143,32 +139,35 @@ def labelled(cells: np.ndarray) -> np.ndarray:
 
 
 def _part(
-    near: Inside, own: np.ndarray, kind: int, courses: Sequence[Course], outline: Outline, depth_at: Depth
+    near: Points,
+    own: np.ndarray,
+    kind: int,
+    seam: frozenset[tuple[int, ...]],
+    nodes: np.ndarray,
+    courses: Sequence[Course],
+    settings: Settings,
 ) -> Part:
     """Return the part that some points inside make."""
-    s, w = near.place[own, 0], near.place[own, 2]
-    return Part(
-        kind,
-        (float(s.min()), float(s.max())),
-        (float(w.min()), float(w.max())),
-        len(own),
-        float(near.depth[own].max()),
-        Counter(dict(zip(*(one.tolist() for one in np.unique(near.code[own], return_counts=True))))),
-        in_boxes(near.place[own], courses),
-        bool((near.away_m[own]).min() <= 0.0),
-        list(_surfaces(near, own, courses[0].noise_m, outline, depth_at)),
-    )
+    place, codes = near.place[own], Counter()
+    for code in np.unique(near.code[own]).tolist():
+        codes[code] = int(near.number[own][near.code[own] == code].sum())
+    is_live = bool(away(nodes, place).min() <= LIVE_M)
+    surfaces = tuple(_surfaces(near, own, courses[0], settings))
+    box = in_boxes(place, courses)
+    raw_m = float(near.depth[own].max())
+    return Part(kind, place.min(axis=0), place.max(axis=0), raw_m, codes, box, is_live, surfaces, seam)
 
 
-def _surfaces(near: Inside, own: np.ndarray, noise_m: float, outline: Outline, depth_at: Depth) -> Iterator[Surface]:
+def _surfaces(near: Points, own: np.ndarray, course: Course, settings: Settings) -> Iterator[Surface]:
     """Yield the surfaces of the pieces of a part that may be its deepest."""
     window = np.floor(near.place[own][:, [0, 2]] / WINDOW_M).astype(np.int64)
     order = np.lexsort((-near.depth[own], window[:, 1], window[:, 0]))
     borders = np.flatnonzero((np.diff(window[order], axis=0) != 0).any(axis=1)) + 1
     pieces = [own[some] for some in np.split(order, borders)]
     third = np.array([near.depth[some[min(2, len(some) - 1)]] for some in pieces])
-    for some in (pieces[at] for at in np.flatnonzero(third >= third.max() - HOPELESS_SIGMAS * noise_m)):
+    for some in (pieces[at] for at in np.flatnonzero(third >= third.max() - HOPELESS_SIGMAS * course.noise_m)):
         centre = np.median(near.place[some[:DEEPEST]], axis=0)
         i, j = np.searchsorted(near.place[:, 0], (centre[0] - ALONG_M, centre[0] + ALONG_M))
-        inward = outline.inward(centre[1:])
-        yield surface_of(near.place[i:j], near.depth[i:j], centre, inward, noise_m, depth_at)
+        inward = settings.outline.inward(centre[1:])
+        depth_at = partial(settings.depth, course)
+        yield surface_of(near.place[i:j], near.depth[i:j], centre, inward, course.noise_m, depth_at)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.ndimage import median_filter
+
+from .along import known_at, pieces
 
 ASIDE_M, HEIGHT_M = (1.2, 3.0), (0.12, 1.4)
 """Where edges of platforms are, aside and above the rail tops."""
@@ -47,20 +49,8 @@ LEVEL, EDGE = 0.05, 0.10
 
 
 @dataclass(frozen=True)
-class Edge:
-    """A metre of a platform edge on one side of a track: s, distance from the middle, height, and standard errors."""
-
-    s: float
-    side: int
-    offset_m: float
-    height_m: float
-    sigma_m: float
-    sigmaz_m: float
-
-
-@dataclass(frozen=True)
 class Platform:
-    """An edge along a track; (n,) arrays, one value for each metre."""
+    """An edge along a track: offset from the middle and height, (n,) each, at the middle of each metre."""
 
     course: int
     side: int
@@ -77,31 +67,25 @@ class Platform:
         best = min(NOMINAL_MM, key=lambda nominal: abs(nominal - mean))
         return best if abs(best - mean) <= NOMINAL_WITHIN_MM else None
 
-    def near(self, s: np.ndarray) -> np.ndarray:
-        """Return the number of the metre nearest to chainages, (m,); -1 beyond the platform."""
-        at = np.clip(np.searchsorted(self.s, s), 1, max(len(self.s) - 1, 1))
-        at = np.where(np.abs(self.s[at - 1] - s) <= np.abs(self.s[np.minimum(at, len(self.s) - 1)] - s), at - 1, at)
-        at = np.minimum(at, len(self.s) - 1)
-        return np.where(np.abs(self.s[at] - s) <= LONGEST_HOLE_M, at, -1)
 
+def edges_of(s: np.ndarray, v: np.ndarray, w: np.ndarray) -> np.ndarray:
+    """Return the metres of platform edges in points, (n,) each.
 
-def edges_of(s: np.ndarray, v: np.ndarray, w: np.ndarray) -> list[Edge]:
-    """Return the metres of platform edges in points, (n,) each."""
+    Rows, (k, 6), are s, side, distance from the middle, height, and the standard errors of both.
+    """
     strip = (np.abs(v) > ASIDE_M[0]) & (np.abs(v) < ASIDE_M[1]) & (w > HEIGHT_M[0]) & (w < HEIGHT_M[1] + ABOVE_M[1])
     s, v, w = s[strip], v[strip], w[strip]
+    metre = 2 * np.floor(s).astype(np.int64) + (v > 0)
+    order = np.argsort(metre, kind="stable")
     found = []
-    for side in (1, -1):
-        mine = np.flatnonzero(side * v > 0)
-        metre = np.floor(s[mine]).astype(np.int64)
-        order = np.argsort(metre, kind="stable")
-        for part in np.split(mine[order], np.flatnonzero(np.diff(metre[order])) + 1) if len(mine) else ():
-            edge = _edge(float(np.floor(s[part[0]])) + 0.5, side, np.abs(v[part]), w[part])
-            found += [edge] if edge else []
-    return found
+    for part in np.split(order, np.flatnonzero(np.diff(metre[order])) + 1) if len(order) else ():
+        edge = _edge(np.abs(v[part]), w[part])
+        found += [(np.floor(s[part[0]]) + 0.5, np.sign(v[part[0]]), *edge)] if edge else []
+    return np.reshape(found, (-1, 6))
 
 
-def _edge(s: float, side: int, aside: np.ndarray, w: np.ndarray) -> Edge | None:
-    """Return the edge within a metre; None if there is none."""
+def _edge(aside: np.ndarray, w: np.ndarray) -> tuple[float, float, float, float] | None:
+    """Return offset and height of the edge within a metre, and their standard errors; None if there is none."""
     level = _level(aside, w)
     if level is None:
         return None
@@ -123,7 +107,7 @@ def _edge(s: float, side: int, aside: np.ndarray, w: np.ndarray) -> Edge | None:
         offset, sigma = _first_of_level(aside[on_level])
     residual = rise[on_level]
     sigmaz = float(residual.std() / np.sqrt(on_level.sum()) * 2)
-    return Edge(s, side, offset, height + slope * offset, max(sigma, 1e-4), max(sigmaz, 1e-4))
+    return offset, height + slope * offset, max(sigma, 1e-4), max(sigmaz, 1e-4)
 
 
 def _level(aside: np.ndarray, w: np.ndarray) -> tuple[float, float, np.ndarray] | None:
@@ -157,43 +141,36 @@ def _first_of_level(aside: np.ndarray) -> tuple[float, float]:
     return inner - before / density, float(np.sqrt(before + 1)) / density
 
 
-def platforms_of(course: int, edges: Sequence[Edge]) -> list[Platform]:
-    """Join the metres of a track into platforms."""
-    return [one for side in (1, -1) for one in _runs(course, side, [edge for edge in edges if edge.side == side])]
+def platforms_of(course: int, edges: np.ndarray) -> Iterator[Platform]:
+    """Yield the platforms that the metres of a track make, (k, 6)."""
+    for side in (1, -1):
+        rows = edges[edges[:, 1] == side]
+        rows = rows[np.argsort(rows[:, 0])]
+        smooth = median_filter(rows[:, 2:4], (MEDIAN_OF, 1), mode="nearest")
+        rows = rows[(np.abs(rows[:, 2:4] - smooth) <= STRAY_M).all(axis=1)]
+        for part in pieces(rows[:, 0], rows[:, 2:4], (LARGEST_STEP_M, LARGEST_STEP_M), LONGEST_HOLE_M):
+            s, _, offset, height, sigma, sigmaz = rows[part].T
+            if s[-1] - s[0] + 1.0 >= SHORTEST_M:
+                errors = (float(np.sqrt(np.mean(one**2))) for one in (sigma, sigmaz))
+                yield Platform(course, side, s, offset, height, *errors)
 
 
-def _runs(course: int, side: int, edges: Sequence[Edge]) -> Iterator[Platform]:
-    """Yield the platforms on one side."""
-    if not edges:
-        return
-    rows = np.array(sorted((one.s, one.offset_m, one.height_m, one.sigma_m, one.sigmaz_m) for one in edges))
-    steady = np.abs(rows[:, 1:3] - median_filter(rows[:, 1:3], (MEDIAN_OF, 1), mode="nearest")) <= STRAY_M
-    rows = rows[steady.all(axis=1)]
-    step = np.abs(np.diff(rows[:, 1:3], axis=0)).max(axis=1, initial=0.0) > LARGEST_STEP_M
-    breaks = np.flatnonzero(step | (np.diff(rows[:, 0]) > LONGEST_HOLE_M)) + 1
-    for part in np.split(rows, breaks):
-        if len(part) and part[-1, 0] - part[0, 0] + 1.0 >= SHORTEST_M:
-            sigma, sigmaz = np.sqrt(np.mean(part[:, 3:] ** 2, axis=0))
-            s, offset, height = part[:, :3].T
-            yield Platform(course, side, s, offset, height, float(sigma), float(sigmaz))
-
-
-def on_platforms(platforms: Sequence[Platform], s: np.ndarray, v: np.ndarray, w: np.ndarray) -> np.ndarray:
+def on_platforms(platforms: Iterable[Platform], s: np.ndarray, v: np.ndarray, w: np.ndarray) -> np.ndarray:
     """Return which points, (n,), are of platforms of their track."""
     found = np.zeros(len(s), dtype=bool)
     for one in platforms:
-        at = one.near(s)
-        mine = (at >= 0) & (one.side * v >= one.offset_m[at] - EDGE) & (w <= one.height_m[at] + LEVEL)
-        found |= mine
+        offset, height = edge_at([one], one.course, one.side, s)
+        with np.errstate(invalid="ignore"):
+            found |= (one.side * v >= offset - EDGE) & (w <= height + LEVEL)
     return found
 
 
 def edge_at(platforms: Sequence[Platform], course: int, side: int, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return offset and height of the platform edge on a side of a track at chainages, (n,) each, NaN without one."""
-    offset, height = np.full((2, len(s)), np.nan)
+    found = np.full((len(s), 2), np.nan)
     for one in platforms:
         if (one.course, one.side) == (course, side):
-            at = one.near(s)
-            offset = np.where(at >= 0, one.offset_m[at], offset)
-            height = np.where(at >= 0, one.height_m[at], height)
+            here = known_at(s, one.s, np.column_stack([one.offset_m, one.height_m]), LONGEST_HOLE_M / 2)
+            found = np.where(np.isfinite(here), here, found)
+    offset, height = found.T
     return offset, height

@@ -39,16 +39,8 @@ Points = tuple[tuple[float, float], ...]
 class Profile:
     """An outline across the track, in the plane of both rail tops.
 
-    Attributes
-    ----------
-    points : tuple of (float, float)
-        v and w of a closed ring, metres; the first point is not repeated.
-    rule : str
-        See `REFERENCE`.
-    source : str
-        Where the numbers are printed.
-    said : str or None
-        What was done to the points of a file.
+    `points` are v and w of a closed ring, metres, of which the first is not repeated. For its rule see `REFERENCE`;
+    `source` is where the numbers are printed, and `said` what was done to the points of a file.
     """
 
     name: str
@@ -102,19 +94,10 @@ def mirrored(half: Sequence[tuple[float, float]]) -> Points:
 
 
 def custom(points: Sequence[tuple[float, float]], name: str) -> Profile:
-    """Make a profile from the points of the user's file.
+    """Make a profile from the points of the user's file of that name: v and w in metres.
 
-    Parameters
-    ----------
-    points : sequence of (float, float)
-        v and w in metres. With all v >= 0, a half from its foot to its top; else the whole outline.
-    name : str
-        Name of the file, for messages and the report.
-
-    Raises
-    ------
-    ParameterError
-        There are too few points, they are not in metres, or the outline crosses itself.
+    With all v >= 0 they are a half from its foot to its top; else the whole outline. Raises `ParameterError` if there
+    are too few points, they are not in metres, or the outline crosses itself.
     """
     ring = list(dict.fromkeys(points)) if points and points[0] == points[-1] else list(points)
     if len(ring) < LEAST_POINTS:

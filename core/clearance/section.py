@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import partial
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..run.tasks import Context
 from ..tiles.store import read_stored
 from .frame import Course
-from .outline import Outline
-from .parts import AROUND_M, OTHER, PLATFORM, WIRE, Inside, Parts, parts_of
-from .platforms import Edge, edges_of, on_platforms, platforms_of
+from .parts import OTHER, PLATFORM, WIRE, Part, Points, parts_of
+from .platforms import edges_of, on_platforms, platforms_of
+from .settings import Settings
 from .sweep import HALO_M, POINT, SECTION_M
 from .vehicles import own_vehicle
-from .wires import LIVE_M, Nodes, nodes_of, wire_points
+from .wires import LIVE_M, away, nodes_of
 
 BANDS_M = (0.380, 1.170, 3.250, 4.310, 7.000)
 """Upper ends of the height bands: feet of profiles and platforms, bodies, upper corners, roofs, pantographs."""
@@ -25,83 +24,14 @@ THIRD = 3
 """The third nearest point of a station and band counts: one or two stray points do not."""
 
 MOST_POINTS = 2_000_000
-"""Points of a section above which only the deepest of each cell of a centimetre is kept near the profile."""
+"""Points of a section above which only the deepest of each cell of a centimetre is kept, with their number."""
 
 FINE_M = 0.01
 """Side of these cells: a surface that is fitted has hundreds of them."""
 
-
-@dataclass(frozen=True)
-class Rules:
-    """What is measured.
-
-    Attributes
-    ----------
-    outline : Outline
-    margin_m : float
-        By which the profile is grown.
-    widening : (n, 2) array
-        On the left and on the right of the stations of the track.
-    step_m : float
-        Step of the stations of the result.
-    """
-
-    outline: Outline
-    margin_m: float
-    widening: np.ndarray
-    step_m: float
-
-
-@dataclass(frozen=True)
-class Points:
-    """Points of a section in the frame of their track; (n,) arrays.
-
-    Attributes
-    ----------
-    s, v, w : array
-    depth : array
-        Penetration of the profile, margin and widening included.
-    code : uint8 array
-    is_own : bool array
-        Whether a point is in the section itself, not in the halo.
-    """
-
-    s: np.ndarray
-    v: np.ndarray
-    w: np.ndarray
-    depth: np.ndarray
-    code: np.ndarray
-    is_own: np.ndarray
-
-    def kept(self, which: np.ndarray) -> Points:
-        """Return some of the points."""
-        return Points(*(column[which] for column in vars(self).values()))
-
-
-@dataclass(frozen=True)
-class Least:
-    """The three least values of each station, side and band.
-
-    Attributes
-    ----------
-    cell : (m,) int array
-        Number: station times ten, plus band, plus five on the right.
-    aside_m, margin_m : (m, 3) arrays
-        Distances from the middle and margins, rising; inf where there are fewer points.
-    """
-
-    cell: np.ndarray
-    aside_m: np.ndarray
-    margin_m: np.ndarray
-
-    @classmethod
-    def joined(cls, parts: Sequence[Least]) -> Least:
-        """Return the least values of several parts."""
-        cell = np.repeat(np.concatenate([one.cell for one in parts]), THIRD)
-        aside, margin = (
-            np.concatenate([getattr(one, name).ravel() for one in parts]) for name in ("aside_m", "margin_m")
-        )
-        return cls(np.unique(cell), _three(cell, aside), _three(cell, margin))
+Least = tuple[np.ndarray, np.ndarray]
+"""Numbers of cells and the `THIRD` least values in each, rising. A cell is a station, side and band: ten times the
+station, plus the band, plus five on the right."""
 
 
 @dataclass(frozen=True)
@@ -110,117 +40,102 @@ class Section:
 
     Attributes
     ----------
-    least : Least
+    aside, margin : Least
+        Distances from the middle, and margins, metres.
+    edges : (k, 6) array
+        See `platforms.edges_of`.
+    nodes : (k, 4) array
+        See `wires.nodes_of`.
+    parts : list of Part
     vehicle : tuple of tuple of float
         Start of the part of the track, v and w of the middles of cells that the own vehicle fills.
     """
 
-    least: Least
-    edges: tuple[Edge, ...]
-    nodes: Nodes
-    parts: Parts
+    aside: Least
+    margin: Least
+    edges: np.ndarray
+    nodes: np.ndarray
+    parts: list[Part]
     vehicle: tuple[tuple[float, float, float], ...]
 
 
 def measure_section(
-    courses: Sequence[Course], section: int, files: Sequence[Sequence[str]], rules: Rules, context: Context
+    courses: Sequence[Course], section: int, files: Sequence[Sequence[str]], settings: Settings, context: Context
 ) -> Section:
     """Measure a section; a task.
 
     Given are the track and those around it, and the files of the section before, the section, and the one after it.
     """
-    course, own = courses[0], (section * SECTION_M, (section + 1) * SECTION_M)
-    points = read_points(course, section, files, rules)
+    course, ends = courses[0], (section * SECTION_M, (section + 1) * SECTION_M)
+    points = read_points(course, section, files, settings)
     context.progress.check()
-    is_vehicle, cells = own_vehicle(points.s, points.v, points.w)
+    is_vehicle, vehicle = own_vehicle(*points.place.T)
     points = points.kept(~is_vehicle)
-    nodes = nodes_of(points.s, points.v, points.w, lambda s: course.at(s, course.curvature))
+    s, v, w = points.place.T
+    nodes = nodes_of(points.place, course)
     context.progress.check()
-    edges = edges_of(points.s, points.v, points.w)
+    edges = edges_of(s, v, w)
     context.progress.check()
-    kind = _kinds(points, edges, nodes)
+    points.kind[on_platforms(platforms_of(0, edges), s, v, w)] = PLATFORM
+    points.kind[away(nodes, points.place) <= LIVE_M / 2] = WIRE
+    parts = parts_of(points, nodes, courses, ends, settings)
+    edges, nodes = (one[(one[:, 0] >= ends[0]) & (one[:, 0] < ends[1])] for one in (edges, nodes))
     return Section(
-        least_of(points.kept(points.is_own & (kind != WIRE)), rules),
-        tuple(edge for edge in edges if own[0] <= edge.s < own[1]),
-        nodes.part((nodes.s >= own[0]) & (nodes.s < own[1])),
-        parts_of(_near(points, kind, nodes), courses, own, rules.outline, partial(depth_of, course, rules)),
-        cells,
+        *least_of(points.kept(points.is_own & (points.kind != WIRE)), settings), edges, nodes, parts, vehicle
     )
 
 
-def _kinds(points: Points, edges: Sequence[Edge], nodes: Nodes) -> np.ndarray:
-    """Return what points are of, (n,); see `parts.OTHER`."""
-    kind = np.full(len(points.s), OTHER, dtype=np.int8)
-    kind[on_platforms(platforms_of(0, edges), points.s, points.v, points.w)] = PLATFORM
-    kind[wire_points(nodes, points.s, points.v, points.w)] = WIRE
-    return kind
-
-
-def _near(points: Points, kind: np.ndarray, nodes: Nodes) -> Inside:
-    """Return the points near the profile."""
-    near = np.flatnonzero(points.depth > -AROUND_M)
-    s, v, w = points.s[near], points.v[near], points.w[near]
-    away = nodes.away(s, v, w) - LIVE_M
-    return Inside(
-        np.column_stack([s, v, w]), points.depth[near], points.code[near], kind[near], points.is_own[near], away
-    )
-
-
-def read_points(course: Course, section: int, files: Sequence[Sequence[str]], rules: Rules) -> Points:
+def read_points(course: Course, section: int, files: Sequence[Sequence[str]], settings: Settings) -> Points:
     """Read the points of a section with its halo, in an order that does not depend on the files."""
-    parts = []
+    columns = []
     for off, own in zip((-1, 0, 1), files):
         stored = read_stored(own, POINT)
-        s = stored["s"].astype(float)
-        near = {-1: s >= SECTION_M - HALO_M, 0: np.ones(len(s), dtype=bool), 1: s < HALO_M}[off]
-        columns = [stored[name][near] for name in ("v", "w", "code")]
-        parts.append((s[near] + (section + off) * SECTION_M, *columns, np.full(int(near.sum()), off == 0)))
-    s, v, w, code, is_own = (np.concatenate(column) for column in zip(*parts))
+        s = stored["s"].astype(float) + off * SECTION_M
+        near = (s >= -HALO_M) & (s < SECTION_M + HALO_M)
+        is_own = np.full(int(near.sum()), off == 0)
+        columns.append((s[near] + section * SECTION_M, *(stored[name][near] for name in ("v", "w", "code")), is_own))
+    s, v, w, code, is_own = (np.concatenate(column) for column in zip(*columns))
     order = np.lexsort((code, w, v, s))
-    s, v, w, code, is_own = (column[order] for column in (s, v, w, code, is_own))
-    v, w = v.astype(float), w.astype(float)
-    points = Points(s, v, w, depth_of(course, rules, np.column_stack([s, v, w])), code, is_own)
-    return points if len(s) <= MOST_POINTS else points.kept(_deepest_of_cells(points))
+    place = np.column_stack([s, v.astype(float), w.astype(float)])[order]
+    depth, nothing = settings.depth(course, place), np.full(len(s), OTHER, dtype=np.int8)
+    points = Points(place, depth, code[order], is_own[order], nothing, np.ones(len(s), dtype=np.int64))
+    return points if len(s) <= MOST_POINTS else _thinned(points)
 
 
-def depth_of(course: Course, rules: Rules, place: np.ndarray) -> np.ndarray:
-    """Return the penetration of points, (n, 3): the distance to the widened profile, plus the margin."""
-    s, v, w = place.T
-    sides = course.at(s, rules.widening)
-    narrowed = np.sign(v) * np.maximum(np.abs(v) - np.where(v > 0, sides[:, 0], sides[:, 1]), 0.0)
-    depth = rules.outline.distance(np.column_stack([narrowed, w])) + rules.margin_m
-    return np.where(w >= rules.outline.floor_m, depth, -np.inf)
-
-
-def _deepest_of_cells(points: Points) -> np.ndarray:
-    """Return the numbers of the deepest point of each fine cell, rising."""
-    cell = np.floor(np.column_stack([points.s, points.v, points.w]) / FINE_M).astype(np.int64)
+def _thinned(points: Points) -> Points:
+    """Return the deepest point of each fine cell, with the number of points that it stands for."""
+    cell = np.floor(points.place / FINE_M).astype(np.int64)
     cell -= cell.min(axis=0)
-    size = cell.max(axis=0) + 1
-    number = (cell[:, 0] * size[1] + cell[:, 1]) * size[2] + cell[:, 2]
-    order = np.lexsort((-points.depth, number))
-    first = np.append(True, np.diff(number[order]) != 0)
-    return np.sort(order[first])
+    order = np.argsort(-points.depth, kind="stable")
+    number = np.ravel_multi_index(tuple(cell[order].T), tuple(cell.max(axis=0) + 1))
+    _, first, count = np.unique(number, return_index=True, return_counts=True)
+    rank = np.argsort(order[first])
+    return replace(points.kept(order[first][rank]), number=count[rank])
 
 
-def least_of(points: Points, rules: Rules) -> Least:
-    """Return the three least distances and margins of each station, side and band."""
-    band = np.searchsorted(BANDS_M, points.w)
-    counts = (points.w >= rules.outline.floor_m) & (band < len(BANDS_M))
-    station = np.rint(points.s / rules.step_m).astype(np.int64)
-    cell = (2 * len(BANDS_M) * station + len(BANDS_M) * (points.v < 0) + band)[counts]
-    aside, margin = np.abs(points.v[counts]), -points.depth[counts]
-    return Least(np.unique(cell), _three(cell, aside), _three(cell, margin))
+def least_of(points: Points, settings: Settings) -> tuple[Least, Least]:
+    """Return the least distances and margins of each station, side and band."""
+    s, v, w = points.place.T
+    band = np.searchsorted(BANDS_M, w)
+    counts = (w >= settings.outline.floor_m) & (band < len(BANDS_M))
+    cell = 2 * len(BANDS_M) * np.rint(s / settings.step_m).astype(np.int64) + len(BANDS_M) * (v < 0) + band
+    return least_three(cell[counts], np.abs(v[counts])), least_three(cell[counts], -points.depth[counts])
 
 
-def _three(cell: np.ndarray, value: np.ndarray) -> np.ndarray:
-    """Return the three least values of each cell in the order of the cells, (m, 3)."""
+def least_three(cell: np.ndarray, value: np.ndarray) -> Least:
+    """Return the least values of each cell."""
     order = np.lexsort((value, cell))
     cell, value = cell[order], value[order]
-    first = np.flatnonzero(np.append(True, np.diff(cell) != 0)) if len(cell) else np.empty(0, dtype=np.int64)
-    found = np.full((len(first), THIRD), np.inf)
-    for rank in range(THIRD):
-        at = np.minimum(first + rank, len(cell) - 1)
-        same = cell[at] == cell[first]
-        found[same, rank] = value[at[same]]
+    kept = np.append(np.ones(min(len(cell), THIRD), dtype=bool), cell[THIRD:] != cell[:-THIRD])
+    return cell[kept], value[kept]
+
+
+def third_least(parts: Sequence[Least], size: int) -> np.ndarray:
+    """Return the third least values of cells, (size,), NaN where there are fewer, given the least ones of sections."""
+    found = np.full(size, np.nan)
+    if parts:
+        cell, value = least_three(*(np.concatenate(column) for column in zip(*parts)))
+        at = np.flatnonzero(cell[THIRD - 1 :] == cell[: len(cell) - THIRD + 1]) + THIRD - 1
+        at = at[cell[at] < size]
+        found[cell[at]] = np.where(np.isfinite(value[at]), value[at], np.nan)
     return found

@@ -43,16 +43,9 @@ SURE_SLOPE = 2.0
 
 @dataclass(frozen=True)
 class Surface:
-    """The deepest place of the surface of part of an object.
+    """The deepest place of the surface of part of an object: penetration, its standard error by the fit, and place.
 
-    Attributes
-    ----------
-    depth_m, sigma_m : float
-        Penetration, positive inside, and its standard error by the fit.
-    s, v, w : float
-        The place.
-    is_sure : bool
-        Whether enough points make a surface or a bush.
+    `is_sure` where enough points make a surface or a bush.
     """
 
     depth_m: float

@@ -26,67 +26,35 @@ LIMIT_LESS_M = 0.033
 """Part of the widening of the reference line that the limit of the free space already holds (annex 2, 2.1 at 250 m)."""
 
 TIGHT = {
-    REFERENCE: np.array(
-        [
-            [250, 0.020, 0.033],
-            [225, 0.055, 0.060],
-            [200, 0.085, 0.095],
-            [190, 0.095, 0.110],
-            [180, 0.110, 0.130],
-            [170, 0.130, 0.145],
-            [150, 0.165, 0.195],
-            [120, 0.365, 0.395],
-            [100, 0.560, 0.600],
-        ]
+    REFERENCE: (
+        (100, 120, 150, 170, 180, 190, 200, 225, 250),
+        (560, 365, 165, 130, 110, 95, 85, 55, 20),
+        (600, 395, 195, 145, 130, 110, 95, 60, 33),
     ),
-    SPACE: np.array(
-        [
-            [250, 0.000, 0.000],
-            [225, 0.025, 0.030],
-            [200, 0.050, 0.065],
-            [190, 0.065, 0.080],
-            [180, 0.080, 0.100],
-            [150, 0.135, 0.170],
-            [120, 0.335, 0.365],
-            [100, 0.530, 0.570],
-        ]
+    SPACE: (
+        (100, 120, 150, 180, 190, 200, 225, 250),
+        (530, 335, 135, 80, 65, 50, 25, 0),
+        (570, 365, 170, 100, 80, 65, 30, 0),
     ),
 }
-"""Radius, and widening on the inside and the outside, metres, of tight curves (annex 2, 2.1, and annex 1 table 2).
-Between rows linearly."""
+"""Radius in metres, and widening on the inside and on the outside in millimetres, of tight curves (annex 2, 2.1, and
+annex 1 table 2). Between columns linearly."""
 
 
 def widening(curvature: np.ndarray, gauge_m: float | np.ndarray, rule: str, step_m: float) -> np.ndarray:
-    """Return the widening on the left and on the right at stations, (n, 2) metres.
+    """Return the widening on the left and on the right at stations of equal distance, (n, 2) metres.
 
-    Parameters
-    ----------
-    curvature : (n,) array
-        1/m, positive in left-hand curves.
-    gauge_m : float or (n,) array
-        Measured gauge.
-    rule : str
-        Of the profile, see `profiles.REFERENCE`.
-    step_m : float
-        Distance of the stations.
+    `curvature`, (n,), is positive in left-hand curves; the rule is that of the profile, see `profiles.REFERENCE`.
     """
     radius_m = 1.0 / np.maximum(np.abs(curvature), 1e-9)
-    inside, outside = _of_radius(radius_m, np.broadcast_to(gauge_m, radius_m.shape), rule)
+    at, *sides = TIGHT[SPACE if rule == SPACE else REFERENCE]
+    tight = np.array([np.interp(radius_m, at, values) for values in sides]) / 1000
+    if rule == LIMIT:
+        tight = np.maximum(tight - LIMIT_LESS_M, 0.0)
+    nominal, least, most = GAUGES_M
+    loose = (np.clip(np.nan_to_num(gauge_m, nan=least), least, most) - nominal) / 2
+    wide = OVERHANG_M2 / radius_m + loose if rule == REFERENCE else 0.0
+    inside, outside = np.where(radius_m >= FREE_RADIUS_M, wide, tight)
     is_left = curvature > 0
-    sides = np.column_stack([np.where(is_left, inside, outside), np.where(is_left, outside, inside)])
-    return maximum_filter1d(sides, 2 * int(round(REACH_M / step_m)) + 1, axis=0, mode="nearest")
-
-
-def _of_radius(radius_m: np.ndarray, gauge_m: np.ndarray, rule: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return the widening on the inside and on the outside of curves, (n,) each, metres."""
-    table = TIGHT[SPACE if rule == SPACE else REFERENCE]
-    inside, outside = (np.interp(radius_m, table[::-1, 0], table[::-1, column]) for column in (1, 2))
-    is_wide = radius_m >= FREE_RADIUS_M
-    if rule == REFERENCE:
-        nominal, least, most = GAUGES_M
-        known = np.where(np.isfinite(gauge_m), gauge_m, least)
-        loose = (np.clip(known, least, most) - nominal) / 2
-        law = OVERHANG_M2 / radius_m + loose
-        return np.where(is_wide, law, inside), np.where(is_wide, law, outside)
-    less = LIMIT_LESS_M if rule == LIMIT else 0.0
-    return tuple(np.where(is_wide, 0.0, np.maximum(one - less, 0.0)) for one in (inside, outside))  # type: ignore[return-value]
+    both = np.column_stack([np.where(is_left, inside, outside), np.where(is_left, outside, inside)])
+    return maximum_filter1d(both, 2 * int(round(REACH_M / step_m)) + 1, axis=0, mode="nearest")

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+
+from ..polyline import interpolate
+from .along import known_at, pieces
+from .frame import Course
 
 ASIDE_M, HEIGHT_M = 1.1, (4.4, 7.0)
 """Where a contact wire is: beyond, no pantograph reaches it."""
@@ -64,79 +68,44 @@ ARMS_M = 4.6
 
 
 @dataclass(frozen=True)
-class Nodes:
-    """Places of the wire along a track; (n,) arrays."""
+class Wire:
+    """A contact wire over a track: s, v, w and the standard error of places, (n,) each."""
 
+    course: int
     s: np.ndarray
     v: np.ndarray
     w: np.ndarray
     sigma_m: np.ndarray
 
-    @classmethod
-    def joined(cls, parts: Sequence[Nodes]) -> Nodes:
-        """Return the places of several parts, in order."""
-        columns = [np.concatenate([np.empty(0), *(getattr(one, name) for one in parts)]) for name in NAMES]
-        order = np.argsort(columns[0], kind="stable")
-        return cls(*(column[order] for column in columns))
-
-    def part(self, which: np.ndarray) -> Nodes:
-        """Return some of the places."""
-        return Nodes(*(getattr(self, name)[which] for name in NAMES))
-
-    def away(self, s: np.ndarray, v: np.ndarray, w: np.ndarray) -> np.ndarray:
-        """Return the distance of points, (m,), from the wire; inf where there is none."""
-        if len(self.s) < 2:
-            return np.full(len(s), np.inf)
-        after = np.clip(np.searchsorted(self.s, s), 1, len(self.s) - 1)
-        hole = self.s[after] - self.s[after - 1]
-        found = np.hypot(v - np.interp(s, self.s, self.v), w - np.interp(s, self.s, self.w))
-        beyond = (s < self.s[0] - BIN_M) | (s > self.s[-1] + BIN_M)
-        return np.where(beyond | (hole > LONGEST_GAP_M), np.inf, found)
-
-
-NAMES = ("s", "v", "w", "sigma_m")
-
-
-@dataclass(frozen=True)
-class Wire:
-    """A contact wire over a track."""
-
-    course: int
-    nodes: Nodes
-
     @property
     def length_m(self) -> float:
         """Length along the track."""
-        return float(self.nodes.s[-1] - self.nodes.s[0])
+        return float(self.s[-1] - self.s[0])
 
     @property
     def grade_pm(self) -> float:
         """Steepest gradient against the track over 20 m, per mille; NaN for a shorter wire."""
-        s, w = self.nodes.s, self.nodes.w
-        ahead = np.interp(s + GRADE_M, s, w)
-        known = s + GRADE_M <= s[-1]
-        return float(np.abs(ahead - w)[known].max() / GRADE_M * 1000) if known.any() else np.nan
+        known = self.s + GRADE_M <= self.s[-1]
+        rise = np.abs(np.interp(self.s + GRADE_M, self.s, self.w) - self.w)[known]
+        return float(rise.max() / GRADE_M * 1000) if known.any() else np.nan
 
 
-def nodes_of(s: np.ndarray, v: np.ndarray, w: np.ndarray, curvature: Callable[[np.ndarray], np.ndarray]) -> Nodes:
-    """Return the places of the contact wire in points, (n,) each, over a track whose curvature a function gives."""
-    mine = (np.abs(v) < ASIDE_M) & (w > HEIGHT_M[0]) & (w < HEIGHT_M[1])
-    s, v, w = s[mine], v[mine], w[mine]
-    bins, groups = _groups(s, v, w)
+def nodes_of(place: np.ndarray, course: Course) -> np.ndarray:
+    """Return the places of the contact wire over a track in points, (n, 3): s, v, w and standard errors, (k, 4)."""
+    _, v, w = place.T
+    points = place[(np.abs(v) < ASIDE_M) & (w > HEIGHT_M[0]) & (w < HEIGHT_M[1])]
+    bins, groups = _groups(*points.T)
     chain = _chain(groups)
-    there = chain >= 0
-    if there.sum() < LEAST_FITTED:
-        return Nodes.joined([])
+    there = np.flatnonzero(chain >= 0)
+    if len(there) < LEAST_FITTED:
+        return np.empty((0, 4))
     at = (bins[there] + 0.5) * BIN_M
-    course = np.array([groups[i][chain[i]][:2] for i in np.flatnonzero(there)])
-    near = (np.abs(v - np.interp(s, at, course[:, 0])) <= NEAR_M[0]) & (
-        np.abs(w - np.interp(s, at, course[:, 1])) <= NEAR_M[1]
-    )
-    points = np.column_stack([s, v, w])[near]
+    way = np.array([groups[i][chain[i]][:2] for i in there])
+    points = points[(np.abs(points[:, 1:] - interpolate(way, at, points[:, 0])) <= NEAR_M).all(axis=1)]
     points = points[np.argsort(points[:, 0], kind="stable")]
-    refined = (_refined(points, *one) for one in zip(at.tolist(), curvature(at).tolist()))
-    rows = [row for row in refined if row is not None]
-    return Nodes(*np.reshape(rows, (-1, 4)).T)
+    curvature = course.at(at, course.curvature)
+    refined = (_refined(points, *one) for one in zip(at.tolist(), curvature.tolist()))
+    return np.reshape([row for row in refined if row is not None], (-1, 4))
 
 
 def _groups(s: np.ndarray, v: np.ndarray, w: np.ndarray) -> tuple[np.ndarray, list[np.ndarray]]:
@@ -229,30 +198,25 @@ def _straight(ahead: np.ndarray, vw: np.ndarray, curvature: float) -> tuple[floa
     return float(fit[0, 0]), float(fit[0, 1]), both * float(np.sqrt(spread)), both
 
 
-def wires_of(course: int, nodes: Nodes) -> Iterator[Wire]:
-    """Yield the wires over a track: they part where the places jump, and at long gaps."""
-    if not len(nodes.s):
-        return
-    jumps = (np.abs(np.diff(nodes.v)) > JUMP_M[0]) | (np.abs(np.diff(nodes.w)) > JUMP_M[1])
-    breaks = np.flatnonzero(jumps | (np.diff(nodes.s) > LONGEST_GAP_M)) + 1
-    for part in np.split(np.arange(len(nodes.s)), breaks):
-        if nodes.s[part[-1]] - nodes.s[part[0]] >= SHORTEST_M:
-            yield Wire(course, nodes.part(part))
+def wires_of(course: int, nodes: np.ndarray) -> Iterator[Wire]:
+    """Yield the wires over a track, given places in order: they part where these jump, and at long gaps."""
+    for part in pieces(nodes[:, 0], nodes[:, 1:3], JUMP_M, LONGEST_GAP_M):
+        if nodes[part[-1], 0] - nodes[part[0], 0] >= SHORTEST_M:
+            yield Wire(course, *nodes[part].T)
 
 
-def wire_points(nodes: Nodes, s: np.ndarray, v: np.ndarray, w: np.ndarray) -> np.ndarray:
-    """Return which points, (n,), are of the wire and its clamps."""
-    return (w > HEIGHT_M[0]) & (nodes.away(s, v, w) <= LIVE_M / 2)
+def away(nodes: np.ndarray, place: np.ndarray) -> np.ndarray:
+    """Return the distance of points, (n, 3), from the places of a wire, (k, 4); inf where there is none."""
+    off = place[:, 1:] - known_at(place[:, 0], nodes[:, 0], nodes[:, 1:3], LONGEST_GAP_M / 2)
+    return np.nan_to_num(np.hypot(*off.T), nan=np.inf)
 
 
 def wire_at(wires: Sequence[Wire], course: int, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return height and stagger of the contact wire at chainages, (n,) each, NaN without one."""
-    height, stagger = np.full((2, len(s)), np.nan)
+    found = np.full((len(s), 2), np.nan)
     for one in wires:
         if one.course == course:
-            nodes = one.nodes
-            after = np.clip(np.searchsorted(nodes.s, s), 1, len(nodes.s) - 1)
-            near = (s >= nodes.s[0]) & (s <= nodes.s[-1]) & (nodes.s[after] - nodes.s[after - 1] <= LONGEST_GAP_M)
-            height = np.where(near, np.interp(s, nodes.s, nodes.w), height)
-            stagger = np.where(near, np.interp(s, nodes.s, nodes.v), stagger)
+            here = known_at(s, one.s, np.column_stack([one.w, one.v]), 2 * BIN_M)
+            found = np.where(np.isfinite(here), here, found)
+    height, stagger = found.T
     return height, stagger

@@ -11,7 +11,7 @@ from ..clearance.measure import Clearance, Stations
 from ..clearance.neighbours import Side
 from ..clearance.platforms import Platform, edge_at
 from ..clearance.section import BANDS_M
-from ..clearance.wires import Nodes, wire_at
+from ..clearance.wires import wire_at
 from ..fields import CLEARANCE, INTRUSIONS, PLATFORMS, SIDES, WIRES
 from ..kilometres.axes import PlacedAxes
 from .layers import Layer
@@ -108,28 +108,24 @@ def _edge(found: Clearance, one: Platform) -> np.ndarray:
 
 def wires_layer(found: Clearance, axes: PlacedAxes | None) -> Layer:
     """Make the layer of the contact wires."""
-    lines = [_drawn(found, one.course, one.nodes) for one in found.wires]
+    lines = [found.courses[one.course].places(one.s, one.v, one.w) for one in found.wires]
     table = [
         {
             "wire": number,
             "track_id": found.courses[one.course].track_id,
-            "from_m": one.nodes.s[0],
-            "to_m": one.nodes.s[-1],
+            "from_m": one.s[0],
+            "to_m": one.s[-1],
             "length_m": one.length_m,
-            **dict(zip(("height_mm", "hmin_mm", "hmax_mm"), _mean_and_ends(one.nodes.w))),
-            "stagmin_mm": 1000 * one.nodes.v.min(),
-            "stagmax_mm": 1000 * one.nodes.v.max(),
+            **dict(zip(("height_mm", "hmin_mm", "hmax_mm"), _mean_and_ends(one.w))),
+            "stagmin_mm": 1000 * one.v.min(),
+            "stagmax_mm": 1000 * one.v.max(),
             "grade_pm": one.grade_pm,
-            "sigma_mm": 1000 * float(np.sqrt(np.mean(one.nodes.sigma_m**2))),
+            "sigma_mm": 1000 * float(np.sqrt(np.mean(one.sigma_m**2))),
             **_extent_km(found, axes, line),
         }
         for number, (one, line) in enumerate(zip(found.wires, lines), start=1)
     ]
     return Layer(WIRES, [[row[field.name] for row in table] for field in WIRES.fields], lines)
-
-
-def _drawn(found: Clearance, course: int, nodes: Nodes) -> np.ndarray:
-    return found.courses[course].places(nodes.s, nodes.v, nodes.w)
 
 
 def _mean_and_ends(values_m: np.ndarray) -> tuple[float, float, float]:

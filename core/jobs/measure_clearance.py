@@ -35,7 +35,8 @@ if TYPE_CHECKING:
     import numpy as np
 
     from ..clearance.frame import Course
-    from ..clearance.measure import Clearance, Settings
+    from ..clearance.measure import Clearance
+    from ..clearance.settings import Settings
     from ..clouds.points import Request
     from ..kilometres.axes import PlacedAxes
     from ..progress import Progress
@@ -133,7 +134,7 @@ def _run(values: Values, progress: Progress) -> Result:
 
 def _settings(values: Values, profile: Profile) -> Settings:
     """Return what is measured."""
-    from ..clearance.measure import Settings
+    from ..clearance.settings import Settings
 
     return Settings(
         profile,
@@ -202,9 +203,9 @@ def _check_rails(course: Course, rails: Sequence[Any]) -> None:
     """Refuse rails that are not beside their centerline."""
     import numpy as np
 
-    from ..clearance.frame import SAME_PLACE_M, rail_offsets
+    from ..clearance.frame import SAME_PLACE_M
 
-    left, right = rail_offsets(course, rails) if rails else (np.nan, np.nan)
+    left, right = course.beside_m
     if abs(left - right) > SAME_PLACE_M or (rails and not (np.isfinite(left) and np.isfinite(right))):
         raise RailExtractError(
             f"RAILS are {left:.2f} and {right:.2f} m beside track {course.track_id} of INPUT: give the rails of the "
@@ -231,12 +232,13 @@ def _check_cloud(found: Clearance, progress: Progress) -> None:
     import numpy as np
 
     swept = found.swept
-    if not swept.nearby:
-        raise RailExtractError("POINTS has no point within 10 m of a track: check the coordinate systems.")
-    if abs(swept.above_m) > HEIGHTS_OFF_M:
-        where = "above" if swept.above_m > 0 else "below"
+    if not swept.seen:
+        raise RailExtractError("POINTS has no point beside a track: check the coordinate systems.")
+    above_m = float(np.median(swept.heights))
+    if abs(above_m) > HEIGHTS_OFF_M:
+        where = "above" if above_m > 0 else "below"
         raise RailExtractError(
-            f"The cloud lies {abs(swept.above_m):.0f} m {where} the tracks: are these ellipsoidal against levelled "
+            f"The cloud lies {abs(above_m):.0f} m {where} the tracks: are these ellipsoidal against levelled "
             "heights? Give both in the same heights."
         )
     used = np.flatnonzero(swept.census)

@@ -242,10 +242,10 @@ def _wires(found: Clearance) -> Iterator[str]:
     rows = [
         (
             found.courses[one.course].track_id,
-            f"{one.nodes.s[0]:,.1f} m",
-            f"{one.nodes.s[-1]:,.1f} m",
-            *(figure(1000 * float(pick(one.nodes.w))) for pick in PICKS),
-            *(figure(1000 * float(pick(one.nodes.v))) for pick in PICKS[1:]),
+            f"{one.s[0]:,.1f} m",
+            f"{one.s[-1]:,.1f} m",
+            *(figure(1000 * float(pick(one.w))) for pick in PICKS),
+            *(figure(1000 * float(pick(one.v))) for pick in PICKS[1:]),
             figure(one.grade_pm, ".1f", "‰"),
         )
         for one in found.wires

@@ -112,6 +112,8 @@ class ReviewDock(QDockWidget):
         gone = self._layer is not None and (sip.isdeleted(self._layer) or self._layer not in layers)
         if self._layer is None or gone:
             self.show_layer(layers[0].id() if layers else None)
+        elif self._sections is not None and self._sections.lacks_stations:
+            self.show_layer(self._layer.id())  # QGIS adds the layers of a run one by one
         else:
             self.layers.setCurrentIndex(self.layers.findData(self._layer.id()))
 

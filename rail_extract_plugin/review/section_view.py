@@ -66,13 +66,13 @@ class SectionView(QWidget):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._picture: Picture | None = None
+        self.picture: Picture | None = None
         self.setMinimumHeight(140)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
 
     def show_picture(self, picture: Picture | None) -> None:
         """Draw another picture."""
-        self._picture = picture
+        self.picture = picture
         self.update()
 
     def sizeHint(self) -> QSize:
@@ -84,11 +84,11 @@ class SectionView(QWidget):
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         painter.fillRect(self.rect(), PAPER)
-        if self._picture is not None:
-            for panel in self._panels(self._picture):
+        if self.picture is not None:
+            for panel in self._panels(self.picture):
                 painter.save()
                 painter.setClipRect(panel.box)
-                _draw(painter, panel, self._picture)
+                _draw(painter, panel, self.picture)
                 painter.restore()
         painter.end()
 

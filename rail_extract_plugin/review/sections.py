@@ -80,14 +80,16 @@ class Sections:
         self.cloud = cloud_of(layer)
         self._units_m = np.array(self.cloud.units_m if self.cloud else (1.0, 1.0, 1.0))
         self._run = layer.customProperty(RUN)
-        self._stations = _stations_of_run(self._run) if any(one.is_intrusion for one in found) else {}
+        is_clearance = any(one.is_intrusion for one in found)
+        self._stations = _stations_of_run(self._run) if is_clearance else {}
+        self.lacks_stations = is_clearance and not self._stations
         self._planes: dict[int, CrossSection] = {one.feature.id(): self._plane(one) for one in found}
         self.reach_m = WIDE_M if self._stations else REACH_M
         self.points: dict[int, np.ndarray] = {}
         self.note = "" if self.cloud else "The layer does not state its cloud: only rails are shown."
         if self.cloud and not all(Path(path).exists() for path in self.cloud.paths):
             self.note = f"{self.cloud.name} is not at its place any more: only rails are shown."
-        if any(one.is_intrusion for one in found) and not self._stations:
+        if self.lacks_stations:
             self.note = "Load the output Clearance of the same run to see cross-sections."
 
     @property

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from rail_extract.core.clearance.measure import Settings, measure
+from rail_extract.core.clearance.measure import measure
 from rail_extract.core.clearance.profiles import named
+from rail_extract.core.clearance.settings import Settings
 from rail_extract.core.clouds.points import ask
 from rail_extract.core.run.loop import Runner
 from rail_extract.laboratory.scenes.clearance import courses_of, write_points

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from rail_extract.core.clearance.measure import LEAVE_OUT
+from rail_extract.core.clearance.settings import LEAVE_OUT
 from rail_extract.core.clearance.profiles import custom
 from rail_extract.laboratory.curves import Element
 from rail_extract.laboratory.scenes import clearance as scenes
@@ -185,10 +185,10 @@ def test_the_contact_wire_is_followed_below_droppers_and_arms(swept):
     found = swept(scene)
     (wire,) = found.wires
     assert wire.length_m > 55
-    assert 1000 * np.median(wire.nodes.w) == pytest.approx(5300, abs=2)
-    stagger = np.interp(wire.nodes.s, [5.0, 35.0, 65.0], [-0.2, 0.2, -0.2])
-    away_from_supports = np.abs((wire.nodes.s - 5.0 + 15.0) % 30.0 - 15.0) > 1.0
-    assert np.sqrt(np.mean((wire.nodes.v - stagger)[away_from_supports] ** 2)) < 2e-3
+    assert 1000 * np.median(wire.w) == pytest.approx(5300, abs=2)
+    stagger = np.interp(wire.s, [5.0, 35.0, 65.0], [-0.2, 0.2, -0.2])
+    away_from_supports = np.abs((wire.s - 5.0 + 15.0) % 30.0 - 15.0) > 1.0
+    assert np.sqrt(np.mean((wire.v - stagger)[away_from_supports] ** 2)) < 2e-3
 
 
 def test_a_wire_inside_a_profile_is_named(swept):

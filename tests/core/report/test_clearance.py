@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
-from rail_extract.core.clearance.measure import Settings, measure
+from rail_extract.core.clearance.measure import measure
 from rail_extract.core.clearance.profiles import named
+from rail_extract.core.clearance.settings import Settings
 from rail_extract.core.clouds.points import ask
 from rail_extract.core.report.clearance import clearance_page, summary, verdict
 from rail_extract.core.run.loop import Runner
