@@ -17,7 +17,7 @@ def known_at(at: np.ndarray, s: np.ndarray, values: np.ndarray, reach_m: float) 
 
 
 def pieces(s: np.ndarray, values: np.ndarray, steps: Sequence[float], hole_m: float) -> list[np.ndarray]:
-    """Return the numbers of the places, (n,), between which no value, (n, d), changes by more than its step, or s by a hole.
+    """Return the numbers of the places of each piece: within it no value, (n, d), changes by its step, nor s by a hole.
 
     >>> [one.tolist() for one in pieces(np.array([0, 1, 2, 9]), np.array([[0], [0], [5], [5]]), (1,), 3)]
     [[0, 1], [2], [3]]

@@ -33,7 +33,7 @@ HALF_SPACING_M = 0.75
 """Distance of a rail's middle from the centerline where the gauge is not stated: that of standard gauge."""
 
 HEAD_M = 0.07
-"""Width of a head: the middles of rails are so much further apart than their gauge."""
+"""Width of a head: the middles of rails are further apart than their gauge by it."""
 
 RAIL_REACH_M = 0.35
 """A rail is looked for within this distance of its expected place: less than half of the narrowest spacing, so that the

@@ -35,7 +35,7 @@ class Intrusion:
     """An object inside the profile of a track; its attributes are the fields of the layer, lengths in their units.
 
     `course` is the number of the track among the courses, and `xyz`, (3,), the worst place, metres from the zero of the
-    coordinate system.
+    coordinate system. `lean` is v and w along the surface there.
     """
 
     course: int
@@ -55,6 +55,7 @@ class Intrusion:
     class_code: int
     what: str
     xyz: np.ndarray
+    lean: tuple[float, float]
     intrusion: int = 0
     km: float = np.nan
     km_text: str | None = None
@@ -117,6 +118,7 @@ def _object(number: int, course: Course, parts: Sequence[Part], surface: Surface
         class_code=max(codes, key=lambda code: (codes[code], -code)),
         what=_what(course, parts, low, high),
         xyz=course.places(s, v, w)[0],
+        lean=surface.lean,
     )
 
 

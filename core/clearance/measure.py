@@ -15,24 +15,19 @@ from ..rails import Kilometres
 from ..run.loop import Runner
 from ..run.tasks import Task
 from ..tiles.grid import Key
-from ..tiles.store import files_of
 from .frame import Course
 from .intrusions import VEHICLE_WORDS, Intrusion, intrusions_of
 from .neighbours import Side, near, neighbours
 from .platforms import Platform, platforms_of
 from .profiles import NO_RULE
-from .section import BANDS_M, Section, measure_section, read_points, third_least
+from .section import BANDS_M, Section, measure_section, third_least
 from .settings import LEAVE_OUT, Settings
-from .sweep import HALO_M, SECTION_M, Swept, sweep
+from .sweep import Swept, part_of, sweep
 from .widening import EBO, widening
 from .wires import Wire, wires_of
 
 MEASURE_S = 3e-6
 """Run time of a section per point, in seconds."""
-
-PICTURES, SLICE_M, MOST_DRAWN = 20, 0.25, 4000
-"""Cross-sections that are kept for the report, the half length of their points along the track, and the most points of
-each."""
 
 UNSEEN_POINTS, UNSEEN_SHARE = 50.0, 0.10
 """Points per metre within reach below which nothing can be judged, and the share of the length on which that is so."""
@@ -42,7 +37,7 @@ UNSEEN_POINTS, UNSEEN_SHARE = 50.0, 0.10
 class Stations:
     """Stations of a track; (n,) arrays, NaN where nothing is seen.
 
-    `wide_m`, (n, 2), is the widening on the left and on the right. `aside_m` and `margin_m`, (n, 2, 5), are those of the
+    `wide_m`, (n, 2), is the widening on the left and on the right. `aside_m` and `margin_m`, (n, 2, 5), are of the
     third nearest point, by side, left first, and band.
     """
 
@@ -64,19 +59,11 @@ class Stations:
 
 
 @dataclass(frozen=True)
-class CrossSection:
-    """The points around the worst place of an intrusion: v, w, and class, (n,) each."""
-
-    intrusion: Intrusion
-    v: np.ndarray
-    w: np.ndarray
-    code: np.ndarray
-    wide_m: tuple[float, float]
-
-
-@dataclass(frozen=True)
 class Clearance:
-    """All that was measured; `frame` has its origin at the zero of the coordinate system."""
+    """All that was measured; `frame` has its origin at the zero of the coordinate system.
+
+    `vehicle` has the number of the track and the section of the places where the vehicle of the scanner was left out.
+    """
 
     settings: Settings
     frame: LocalFrame
@@ -85,8 +72,7 @@ class Clearance:
     stations: tuple[Stations, ...]
     platforms: tuple[Platform, ...]
     wires: tuple[Wire, ...]
-    sections: tuple[CrossSection, ...]
-    vehicle: tuple[tuple[int, float, float, float], ...]
+    vehicle: tuple[Key, ...]
     swept: Swept
     warnings: tuple[str, ...] = field(default=())
 
@@ -142,8 +128,7 @@ def measure(
         tuple(_stations(courses, at, swept, own, settings) for at, own in enumerate(tracks)),
         tuple(one for at, own in enumerate(tracks) for one in platforms_of(at, _rows([each.edges for each in own], 6))),
         tuple(one for at, own in enumerate(tracks) for one in wires_of(at, _rows([each.nodes for each in own], 4))),
-        tuple(_cross_section(one, courses[one.course], swept, settings) for one in objects[:PICTURES]),
-        tuple((at, *cell) for at, own in enumerate(tracks) for one in own for cell in one.vehicle),
+        tuple(key for key, one in sorted(found.items()) if len(one.vehicle)),
         swept,
     )
 
@@ -159,24 +144,12 @@ def _tasks(courses: Sequence[Course], swept: Swept, settings: Settings) -> dict[
     """Return the tasks that measure the sections."""
     tasks = {}
     for (at, section), count in sorted(swept.sections.items()):
-        own = _part(courses[at], section)
+        own = part_of(courses[at], section)
         others = (near(own, other) for number, other in enumerate(courses) if number != at)
-        arguments = ([own, *filter(None, others)], section, _files(swept, at, section), settings)
+        arguments = ([own, *filter(None, others)], section, swept.files_around(at, section), settings)
         label = f"The section {section} of track {own.track_id}"
         tasks[at, section] = Task(label, measure_section, arguments, weight=MEASURE_S * count)
     return tasks
-
-
-def _files(swept: Swept, at: int, section: int) -> list[list[str]]:
-    """Return the files of the section before, the section, and the one after it."""
-    return [files_of((at, section + off), swept.files) for off in (-1, 0, 1)]
-
-
-def _part(course: Course, section: int) -> Course:
-    """Return the stations of a section with its halo."""
-    low = int(np.floor((section * SECTION_M - HALO_M) / course.step_m)) - 1
-    high = int(np.ceil(((section + 1) * SECTION_M + HALO_M) / course.step_m)) + 2
-    return course.part(max(low, 0), min(high, len(course.xyz)))
 
 
 def _rows(parts: Sequence[np.ndarray], columns: int) -> np.ndarray:
@@ -203,13 +176,3 @@ def _stations(
         Side(*(column[nearest] for column in vars(one).values())) for one in neighbours(courses, at, settings)
     )
     return Stations(course, s, course.at(s, course.xyz), course.wide_m[nearest], aside, margin, points, left, right)
-
-
-def _cross_section(one: Intrusion, course: Course, swept: Swept, settings: Settings) -> CrossSection:
-    """Return the points around the worst place of an intrusion."""
-    section = int(one.chainage_m // SECTION_M)
-    points = read_points(_part(course, section), section, _files(swept, one.course, section), settings)
-    near = np.flatnonzero(np.abs(points.place[:, 0] - one.chainage_m) <= SLICE_M)
-    near = near[:: max(len(near) // MOST_DRAWN, 1)]
-    left_m, right_m = course.wide_m[course.station(np.array([one.chainage_m]))][0].tolist()
-    return CrossSection(one, *points.place[near, 1:].T, points.code[near], (left_m, right_m))

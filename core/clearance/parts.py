@@ -148,7 +148,7 @@ def _part(
     settings: Settings,
 ) -> Part:
     """Return the part that some points inside make."""
-    place, codes = near.place[own], Counter()
+    place, codes = near.place[own], Counter[int]()
     for code in np.unique(near.code[own]).tolist():
         codes[code] = int(near.number[own][near.code[own] == code].sum())
     is_live = bool(away(nodes, place).min() <= LIVE_M)

@@ -36,19 +36,10 @@ station, plus the band, plus five on the right."""
 
 @dataclass(frozen=True)
 class Section:
-    """What a section shows.
+    """What a section shows: least distances from the middle and margins, metres, and parts of objects.
 
-    Attributes
-    ----------
-    aside, margin : Least
-        Distances from the middle, and margins, metres.
-    edges : (k, 6) array
-        See `platforms.edges_of`.
-    nodes : (k, 4) array
-        See `wires.nodes_of`.
-    parts : list of Part
-    vehicle : tuple of tuple of float
-        Start of the part of the track, v and w of the middles of cells that the own vehicle fills.
+    `edges` and `nodes` are rows of `platforms.edges_of` and of `wires.nodes_of`; `vehicle`, (k, 2), are v and w of the
+    cells that the vehicle of the scanner fills.
     """
 
     aside: Least
@@ -56,7 +47,7 @@ class Section:
     edges: np.ndarray
     nodes: np.ndarray
     parts: list[Part]
-    vehicle: tuple[tuple[float, float, float], ...]
+    vehicle: np.ndarray
 
 
 def measure_section(
@@ -69,7 +60,7 @@ def measure_section(
     course, ends = courses[0], (section * SECTION_M, (section + 1) * SECTION_M)
     points = read_points(course, section, files, settings)
     context.progress.check()
-    is_vehicle, vehicle = own_vehicle(*points.place.T)
+    is_vehicle, vehicle = own_vehicle(points.place)
     points = points.kept(~is_vehicle)
     s, v, w = points.place.T
     nodes = nodes_of(points.place, course)

@@ -6,7 +6,7 @@ Of N points of a plane, the deepest lies two to three standard deviations of the
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -45,7 +45,7 @@ SURE_SLOPE = 2.0
 class Surface:
     """The deepest place of the surface of part of an object: penetration, its standard error by the fit, and place.
 
-    `is_sure` where enough points make a surface or a bush.
+    `is_sure` where enough points make a surface or a bush. `lean` is v and w along the surface, 0 where there is none.
     """
 
     depth_m: float
@@ -54,6 +54,7 @@ class Surface:
     v: float
     w: float
     is_sure: bool
+    lean: tuple[float, float] = (0.0, 0.0)
 
 
 Depth = Callable[[np.ndarray], np.ndarray]
@@ -66,18 +67,9 @@ def surface_of(
     """Fit the deepest part of an object, and measure how deep the fitted surface is.
 
     The depth of points beside a corner of the profile bends where the surface does not, so that not the depth is
-    fitted, but how far inwards the surface is, seen across the nearest edge.
-
-    Parameters
-    ----------
-    place : (n, 3) array
-        s, v and w of the points around, also of those outside of the profile.
-    depth : (n,) array
-        Penetration of the points.
-    centre : (3,) array
-        Where the deepest points are.
-    inward : (2,) array
-        Unit vector in v and w, perpendicular to the nearest edge of the profile.
+    fitted, but how far inwards the surface is, seen across the nearest edge. Given are s, v and w of the points around,
+    (n, 3), also of those outside of the profile, and their penetration; where the deepest ones are, (3,); and the unit
+    vector in v and w, (2,), perpendicular to the nearest edge of the profile.
     """
     off = place - centre
     s, t, h = off[:, 0], off[:, 1] * inward[1] - off[:, 2] * inward[0], off[:, 1:] @ inward
@@ -93,13 +85,13 @@ def surface_of(
     if chosen is None:
         third = deepest[2]
         return _at(place[third], float(depth[third]), 2 * noise_m, True)
-    fitted, sigma = _smoothed(design[chosen], h[chosen], noise_m)
-    places = centre + np.column_stack(
-        [s[chosen], np.outer(t[chosen], [inward[1], -inward[0]]) + np.outer(fitted, inward)]
-    )
+    fitted, sigma, slope = _smoothed(design[chosen], h[chosen], noise_m)
+    beside = np.array([inward[1], -inward[0]])
+    places = centre + np.column_stack([s[chosen], np.outer(t[chosen], beside) + np.outer(fitted, inward)])
     depths = depth_at(places)
     at = int(np.argmax(depths))
-    return _at(places[at], float(depths[at]), float(sigma[at]), True)
+    right, up = (beside + slope * inward).tolist()
+    return replace(_at(places[at], float(depths[at]), float(sigma[at]), True), lean=(right, up))
 
 
 def _at(place: np.ndarray, depth_m: float, sigma_m: float, is_sure: bool) -> Surface:
@@ -125,8 +117,8 @@ def _on_surface(design: np.ndarray, h: np.ndarray, noise_m: float) -> np.ndarray
     return None if near.sum() < LEAST_POINTS or above >= max(STRAY_LEAST, STRAY_SHARE * len(h)) else near
 
 
-def _smoothed(design: np.ndarray, h: np.ndarray, noise_m: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return the surface at its points, a plane or cylinder whose slopes and bend are sure, and errors."""
+def _smoothed(design: np.ndarray, h: np.ndarray, noise_m: float) -> tuple[np.ndarray, np.ndarray, float]:
+    """Return the surface at its points, a plane or cylinder whose slopes and bend are sure, errors, and its slope."""
     kept = [0, 1, 2, 3] if _solved(design, h)[3] < 0 else [0, 1, 2]
     while True:
         own = design[:, kept]
@@ -137,7 +129,8 @@ def _smoothed(design: np.ndarray, h: np.ndarray, noise_m: float) -> tuple[np.nda
         sure = np.abs(c) / np.sqrt(np.maximum(np.diag(spread), 1e-18))
         weakest = int(np.argmin(np.where(np.arange(len(kept)) > 0, sure, np.inf)))
         if len(kept) == 1 or sure[weakest] >= SURE_SLOPE:
-            return own @ c, np.sqrt(np.einsum("ij,jk,ik->i", own, spread, own))
+            errors = np.sqrt(np.einsum("ij,jk,ik->i", own, spread, own))
+            return own @ c, errors, float(c[kept.index(1)]) if 1 in kept else 0.0
         del kept[weakest]
 
 

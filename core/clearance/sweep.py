@@ -20,7 +20,7 @@ from ..run.loop import Runner
 from ..run.tasks import READ_S, Context, Task
 from ..standards import LAST_CLASS
 from ..tiles.grid import Key
-from ..tiles.store import SortedFile, append
+from ..tiles.store import SortedFile, append, files_of
 from .frame import Cells, Course
 from .settings import BELOW_M, Settings
 
@@ -50,16 +50,8 @@ STRIDE = 100
 class Swept:
     """The points of a cloud, or of one of its files, along the tracks.
 
-    Attributes
-    ----------
-    files : tuple of SortedFile
-        Points by track and section.
-    census : (256,) int array
-        Points read by class.
-    heights : (k,) array
-        How far some of the points that are near a track in plan lie above it.
-    seen : Counter
-        Points that are within reach in plan, at any height, by track and station.
+    `files` has them by track and section, and `census`, (256,), the points read by class. `heights`, (k,), is how far
+    some of the points that are near a track in plan lie above it, and `seen` the number of these by track and station.
     """
 
     files: tuple[SortedFile, ...]
@@ -72,6 +64,10 @@ class Swept:
         """Number of points kept by track and section."""
         return sum((Counter(one.counts) for one in self.files), Counter())
 
+    def files_around(self, number: int, section: int) -> list[list[str]]:
+        """Return the files of the section of a track before the given one, of this one, and of the one after it."""
+        return [files_of((number, section + off), self.files) for off in (-1, 0, 1)]
+
     def passed(self, number: int, course: Course) -> np.ndarray:
         """Return the number of points within reach of a track up to its stations, (n,)."""
         found = np.zeros(len(course.xyz), dtype=np.int64)
@@ -79,6 +75,13 @@ class Swept:
             if track == number:
                 found[station] = count
         return np.cumsum(found)
+
+
+def part_of(course: Course, section: int) -> Course:
+    """Return the stations of a section of a track with its halo."""
+    low = int(np.floor((section * SECTION_M - HALO_M) / course.step_m)) - 1
+    high = int(np.ceil(((section + 1) * SECTION_M + HALO_M) / course.step_m)) + 2
+    return course.part(max(low, 0), min(high, len(course.xyz)))
 
 
 def sweep(

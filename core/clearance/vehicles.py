@@ -10,11 +10,8 @@ import numpy as np
 from .frame import Cells, Course
 
 OWN_CELL_M, OWN_LENGTH_M, OWN_SHARE = 0.10, 50.0, 0.5
-"""Cells across the track that are filled in more than this share of the metres over such a length move along with the
-scanner."""
-
-OWN_AROUND_M = 25.0
-"""Length on both sides of such a part that is looked at with it: where the track ends, the part is short."""
+"""Cells across the track that are filled in more than this share of the metres of a section, and of such a length at
+least, move along with the scanner."""
 
 OWN_ASIDE_M, OWN_HEIGHT_M = 1.0, (0.3, 4.0)
 """Where such cells are of the own vehicle: nothing else stands there over such a length on a track on which trains
@@ -42,26 +39,21 @@ ALL = -1
 """Number that stands for all points that were looked at."""
 
 
-def own_vehicle(
-    s: np.ndarray, v: np.ndarray, w: np.ndarray
-) -> tuple[np.ndarray, tuple[tuple[float, float, float], ...]]:
-    """Return which points, (n,), are of the vehicle that carried the scanner, and s, v and w of its cells."""
-    may = np.flatnonzero((np.abs(v) < OWN_ASIDE_M) & (w > OWN_HEIGHT_M[0]) & (w < OWN_HEIGHT_M[1]))
-    found, cells = np.zeros(len(s), dtype=bool), []
+def own_vehicle(place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return which points of a section, (n, 3), are of the vehicle that carried the scanner, and v and w of its cells.
+
+    The cells are (k, 2).
+    """
+    s, v, w = place.T
     metre = np.floor(s).astype(np.int64)
-    for one in np.unique(np.floor(s[may] / OWN_LENGTH_M)).tolist():
-        start, end = one * OWN_LENGTH_M, (one + 1) * OWN_LENGTH_M
-        around = (s >= start - OWN_AROUND_M) & (s < end + OWN_AROUND_M)
-        length = len(np.unique(metre[around]))
-        mine = may[around[may]]
-        place = np.floor(np.column_stack([v[mine], w[mine]]) / OWN_CELL_M).astype(np.int64)
-        filled, cell = np.unique(place, axis=0, return_inverse=True)
-        both = np.unique(np.column_stack([cell.ravel(), metre[mine]]), axis=0)
-        is_own = np.bincount(both[:, 0], minlength=len(filled)) > OWN_SHARE * max(length, OWN_LENGTH_M)
-        own = mine[is_own[cell.ravel()]]
-        found[own[(s[own] >= start) & (s[own] < end)]] = True
-        cells += [(start, *row) for row in ((filled[is_own] + 0.5) * OWN_CELL_M).tolist()]
-    return found, tuple(cells)
+    may = np.flatnonzero((np.abs(v) < OWN_ASIDE_M) & (w > OWN_HEIGHT_M[0]) & (w < OWN_HEIGHT_M[1]))
+    filled, cell = np.unique(np.floor(place[may, 1:] / OWN_CELL_M), axis=0, return_inverse=True)
+    both = np.unique(np.column_stack([cell.ravel(), metre[may]]), axis=0)
+    least = OWN_SHARE * max(len(np.unique(metre)), OWN_LENGTH_M)
+    is_own = np.bincount(both[:, 0], minlength=len(filled)) > least
+    found = np.zeros(len(s), dtype=bool)
+    found[may[is_own[cell.ravel()]]] = True
+    return found, (filled[is_own] + 0.5) * OWN_CELL_M
 
 
 def in_boxes(place: np.ndarray, courses: Sequence[Course]) -> Counter[int]:

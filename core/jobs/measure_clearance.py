@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from ..clearance.profiles import COLUMNS, CUSTOM, NO_RULE, Profile, custom, named
-from ..errors import CrsError, ParameterError, RailExtractError
+from ..errors import ParameterError, RailExtractError
 from ..fields import INTRUSION_FIELDS, LENGTH
 from ..progress import Recording
 from . import inputs, methods, outputs
@@ -34,13 +34,10 @@ if TYPE_CHECKING:
 
     import numpy as np
 
-    from ..clearance.frame import Course
     from ..clearance.measure import Clearance
-    from ..clearance.settings import Settings
-    from ..clouds.points import Request
     from ..kilometres.axes import PlacedAxes
     from ..progress import Progress
-    from .lines import LayerLines
+    from ..report.clearance_slices import Slice
     from .result import Result
     from .values import Values
 
@@ -111,7 +108,11 @@ def _left_out(values: Values) -> tuple[int, ...]:
 def _run(values: Values, progress: Progress) -> Result:
     """Measure the clearance."""
     from ..clearance.measure import measure
+    from ..clearance.settings import Settings
     from ..clearance.sweep import EVERY_CLASS
+    from ..report.clearance_remarks import remarks
+    from ..report.clearance_slices import slices
+    from .clearance_inputs import read_courses
 
     progress = Recording(progress)
     profile, request = _profile(values), values.request(EVERY_CLASS, progress, name="POINTS")
@@ -119,112 +120,19 @@ def _run(values: Values, progress: Progress) -> Result:
         progress.warning(profile.said)
     if values.filled("PROFILE_FILE") and values["PROFILE"] != CUSTOM:
         progress.warning(f"PROFILE_FILE is not used: PROFILE is {profile.name}. Choose CUSTOM for your own profile.")
-    courses = _courses(values, request, progress.span(0.0, READING))
-    settings = _settings(values, profile)
+    courses = read_courses(values, request.zero, progress.span(0.0, READING))
+    step_m, rule, distance_m, trains = (values[name] for name in ("STEP", "WIDENING", "DISTANCE", "TRAINS"))
+    margin_m, floor_m = values["MARGIN"] / 1000, values["FLOOR"] / 1000
+    settings = Settings(profile, margin_m, floor_m, step_m, rule, distance_m, _left_out(values), trains)
     with values.scratch() as folder, values.runner() as runner:
         found = measure(request, courses, settings, folder / "points", runner, progress.span(READING, 1.0))
-    _check_cloud(found, progress)
-    axes = values.axes(values.cloud_crs("POINTS")) if values.has_axis() else None
-    if axes is not None:
-        found = _placed(found, axes, progress)
-    for sentence in _said(found):
+        _check_cloud(found, progress)
+        axes = values.axes(values.cloud_crs("POINTS")) if values.has_axis() else None
+        found = found if axes is None else _placed(found, axes, progress)
+        worst = tuple(slices(found))
+    for sentence in remarks(found):
         progress.warning(sentence)
-    return _result(replace(found, warnings=progress.warnings), axes, values)
-
-
-def _settings(values: Values, profile: Profile) -> Settings:
-    """Return what is measured."""
-    from ..clearance.settings import Settings
-
-    return Settings(
-        profile,
-        values["MARGIN"] / 1000,
-        values["FLOOR"] / 1000,
-        values["STEP"],
-        values["WIDENING"],
-        values["DISTANCE"],
-        _left_out(values),
-        values["TRAINS"],
-    )
-
-
-def _courses(values: Values, request: Request, progress: Progress) -> tuple[Course, ...]:
-    """Return the tracks with the cant of their rails, in metres from the zero of the cloud's coordinate system.
-
-    Raises
-    ------
-    RailExtractError
-        They have no heights, are in heights of another unit, or the rails are of another run.
-    """
-    import numpy as np
-
-    from ..clearance.frame import MIN_LENGTH_M, course_of
-
-    lines = _lines(values, "INPUT", request, progress)
-    shift = lines.frame.shift_to(request.zero)
-    tracks = [replace(one, xyz=one.xyz + shift) for one in lines.centerlines()]
-    flat = [one.track_id for one in tracks if not np.isfinite(one.xyz).all()]
-    if flat:
-        raise RailExtractError(f"Track {flat[0]} of INPUT has no heights: take the centerlines from Extract Rails.")
-    rails = []
-    if values.filled("RAILS"):
-        read = _lines(values, "RAILS", request, progress)
-        rails = [replace(one, xyz=one.xyz + read.frame.shift_to(request.zero)) for one in read.rails(progress)]
-    rails = [one for one in rails if np.isfinite(one.xyz).all()]
-    long = [one for one in tracks if one.line.length_m >= MIN_LENGTH_M]
-    if not long:
-        raise RailExtractError(f"No line of INPUT is {MIN_LENGTH_M:g} m long or longer: give centerlines of tracks.")
-    known = {one.rail_id: one for one in rails}
-    made, lacking = [], []
-    for track in long:
-        ids = (*track.left_ids, *track.right_ids)
-        own = [known[number] for number in ids if number in known]
-        if values.filled("RAILS") and len(own) < len(ids):
-            lacking.append(track.track_id)
-        course = course_of(track, own)
-        _check_rails(course, own)
-        made.append(course)
-    _say_cant(made, lacking, values.filled("RAILS"), progress)
-    return tuple(made)
-
-
-def _lines(values: Values, name: str, request: Request, progress: Progress) -> LayerLines:
-    """Read lines in the coordinate system of the cloud."""
-    from ..clouds.crs import parse_crs, units
-    from .features import read_lines_in
-
-    source, wkt = values.source(name), request.zero.crs_wkt
-    if source.crs_wkt and wkt and units(parse_crs(source.crs_wkt))[1] != request.zero.vertical_unit_m:
-        raise CrsError(f"{name} has heights in another unit than POINTS: give both in the same vertical unit.")
-    return read_lines_in(source, wkt, progress)
-
-
-def _check_rails(course: Course, rails: Sequence[Any]) -> None:
-    """Refuse rails that are not beside their centerline."""
-    import numpy as np
-
-    from ..clearance.frame import SAME_PLACE_M
-
-    left, right = course.beside_m
-    if abs(left - right) > SAME_PLACE_M or (rails and not (np.isfinite(left) and np.isfinite(right))):
-        raise RailExtractError(
-            f"RAILS are {left:.2f} and {right:.2f} m beside track {course.track_id} of INPUT: give the rails of the "
-            "same run."
-        )
-
-
-def _say_cant(courses: Sequence[Course], lacking: Sequence[int], has_rails: bool, progress: Progress) -> None:
-    """Say where the cant is unknown."""
-    without = [str(one.track_id) for one in courses if not one.has_cant]
-    if without and not has_rails:
-        progress.warning("Without RAILS the cant is unknown: what is beside canted track is not judged surely.")
-    elif without:
-        progress.warning(
-            f"Tracks {', '.join(without)} of INPUT state no rails in left_ids and right_ids that RAILS has: their cant "
-            "is unknown."
-        )
-    if lacking:
-        progress.warning(f"RAILS lacks rails of tracks {', '.join(map(str, lacking))}: give all rails of the run.")
+    return _result(replace(found, warnings=progress.warnings), worst, axes, values)
 
 
 def _check_cloud(found: Clearance, progress: Progress) -> None:
@@ -258,25 +166,13 @@ def _placed(found: Clearance, axes: PlacedAxes, progress: Progress) -> Clearance
     def at(xyz: np.ndarray) -> np.ndarray:
         return found.frame.to_crs(xyz)[:, :2]
 
-    xyz = [one.xyz for one in found.intrusions]
-    km = axes.kilometres(at(np.reshape(xyz, (-1, 3))), progress)
-    intrusions = [
-        replace(one, km=float(km.km[number]), km_text=km.km_text[number]) for number, one in enumerate(found.intrusions)
-    ]
-    stations = [replace(one, kilometres=axes.locate(at(one.xyz), progress)) for one in found.stations]
-    by_number = {one.intrusion: one for one in intrusions}
-    sections = tuple(replace(one, intrusion=by_number[one.intrusion.intrusion]) for one in found.sections)
-    return replace(found, intrusions=tuple(intrusions), stations=tuple(stations), sections=sections)
+    km = axes.kilometres(at(np.reshape([one.xyz for one in found.intrusions], (-1, 3))), progress)
+    intrusions = (replace(one, km=float(a), km_text=text) for one, a, text in zip(found.intrusions, km.km, km.km_text))
+    stations = (replace(one, kilometres=axes.locate(at(one.xyz), progress)) for one in found.stations)
+    return replace(found, intrusions=tuple(intrusions), stations=tuple(stations))
 
 
-def _said(found: Clearance) -> list[str]:
-    """Return what the user is told about the result."""
-    from ..report.clearance_remarks import remarks
-
-    return remarks(found)
-
-
-def _result(found: Clearance, axes: PlacedAxes | None, values: Values) -> Result:
+def _result(found: Clearance, worst: Sequence[Slice], axes: PlacedAxes | None, values: Values) -> Result:
     """Return the result."""
     import numpy as np
 
@@ -297,7 +193,7 @@ def _result(found: Clearance, axes: PlacedAxes | None, values: Values) -> Result
         figures,
         found.frame,
         clearance_makers(found, axes),
-        {"REPORT": lambda: clearance_page(found, source, {"Command": values.command})},
+        {"REPORT": lambda: clearance_page(found, worst, source, {"Command": values.command})},
         tuple(summary(found)),
         ShownCloud("POINTS", tuple(range(256)), 0.07),
         found=found,

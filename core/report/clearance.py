@@ -14,6 +14,7 @@ from ..polyline import runs
 from ..progress import counted, metres, written
 from .clearance_pictures import RULES, cross_section, diagram
 from .clearance_remarks import cannot_be_judged
+from .clearance_slices import Slice
 from .markup import figure, made, note, page, section, table, tag, tiles, verdict_box
 from .page import stated
 from .plots import Curve, Panel, broken, draw_panels
@@ -38,15 +39,10 @@ LEAST_SPAN_MM = 20.0
 """Smallest range of a panel, so that noise does not look alarming."""
 
 
-def clearance_page(found: Clearance, source: str, facts: Mapping[str, str]) -> str:
+def clearance_page(found: Clearance, worst: Sequence[Slice], source: str, facts: Mapping[str, str]) -> str:
     """Return the page, a complete HTML document.
 
-    Parameters
-    ----------
-    source : str
-        Name of the cloud.
-    facts : mapping of str to str
-        Further facts to state, by name.
+    Given are the points around the worst places, the name of the cloud, and further facts to state, by name.
     """
     kind, words = verdict(found)
     return page(
@@ -56,7 +52,7 @@ def clearance_page(found: Clearance, source: str, facts: Mapping[str, str]) -> s
         verdict_box(kind, words, found.warnings),
         _tiles(found),
         *(diagram(found, number) for number in range(len(found.courses))),
-        *_cross_sections(found),
+        *_cross_sections(found, worst),
         *_intrusions(found),
         *_distances(found),
         *_platforms(found),
@@ -125,9 +121,9 @@ def _tiles(found: Clearance) -> str:
     return tiles(figures)
 
 
-def _cross_sections(found: Clearance) -> Iterator[str]:
-    if found.sections:
-        drawn = (cross_section(found, one) for one in found.sections)
+def _cross_sections(found: Clearance, worst: Sequence[Slice]) -> Iterator[str]:
+    if worst:
+        drawn = (cross_section(found, one) for one in worst)
         yield section("Worst cross-sections", tag("div", *drawn, class_="crosses"))
 
 

@@ -7,10 +7,11 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..clearance.intrusions import PLATFORM_WORDS, Intrusion
-from ..clearance.measure import Clearance, CrossSection, Stations
+from ..clearance.measure import Clearance, Stations
 from ..clearance.section import BANDS_M
 from ..polyline import runs
 from ..progress import written
+from .clearance_slices import Slice
 from .markup import section, tag, text
 from .plots import LEFT, PANEL, RIGHT, SPACE, WIDTH, Curve, Frame, Panel, Shade, bottom_of, broken, picture
 
@@ -28,6 +29,9 @@ RULES = ".crosses { display: grid; grid-template-columns: repeat(auto-fill, minm
 
 SCALE, HALF_M, HIGH_M = 60.0, 2.9, 5.6
 """Units per metre of a cross-section, and what it shows at least: half its width, and its height."""
+
+SURFACE_M = 0.35
+"""Half the length of the line that shows a fitted surface: that over which it is fitted."""
 
 PALETTE = ("#1565c0", "#2e7d4f", "#8e5bb5", "#b26a00", "#00838f", "#6d4c41")
 """Colours of the classes of points."""
@@ -119,7 +123,7 @@ def _strip(stations: Stations, along: tuple[float, float], top: float) -> str:
     return box + "".join([*rows, *labels, tag("text", heading, x=LEFT, y=top - 8, class_="heading")])
 
 
-def cross_section(found: Clearance, one: CrossSection) -> str:
+def cross_section(found: Clearance, one: Slice) -> str:
     """Draw a cross-section: profile with widening and margin, points by class, surface, depth, and both rails."""
     profile, margin_m = found.settings.profile, found.settings.margin_m
     half = max(HALF_M, profile.half_width_m + 0.4)
@@ -148,11 +152,14 @@ def cross_section(found: Clearance, one: CrossSection) -> str:
     for v in (spacing / 2, -spacing / 2):
         parts.append(tag("rect", x=x(v) - 2.2, y=y(0.0), width=4.4, height=9.0, style="fill: var(--ink)"))
     place = one.intrusion
+    v, w, lean = place.v_mm / 1000, place.w_mm / 1000, SURFACE_M * np.array(place.lean)
+    ends = [f"{x(v + sense * lean[0]):.1f} {y(w + sense * lean[1]):.1f}" for sense in (-1, 1)]
+    parts.append(tag("path", d=f"M{ends[0]}L{ends[1]}", style="stroke: var(--offgauge); stroke-width: 2; fill: none"))
     parts.append(
         tag(
             "circle",
-            cx=x(place.v_mm / 1000),
-            cy=y(place.w_mm / 1000),
+            cx=x(v),
+            cy=y(w),
             r=6,
             style="fill: none; stroke: var(--offgauge); stroke-width: 2",
         )

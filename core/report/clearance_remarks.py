@@ -6,6 +6,7 @@ import numpy as np
 
 from ..clearance.intrusions import VEHICLE_WORDS
 from ..clearance.measure import UNSEEN_SHARE, Clearance
+from ..clearance.sweep import SECTION_M
 from ..polyline import runs
 from ..progress import counted, metres
 
@@ -52,9 +53,10 @@ MOST_NAMED = 4
 def remarks(found: Clearance) -> list[str]:
     """Return the sentences."""
     said = cannot_be_judged(found)
-    for track in sorted({found.courses[at].track_id for at, *_ in found.vehicle}):
-        starts = sorted({s for at, s, *_ in found.vehicle if found.courses[at].track_id == track})
-        said.append(f"The vehicle of the scanner was left out on track {track}, from {starts[0]:,.0f} m on.")
+    for at in sorted({at for at, _ in found.vehicle}):
+        start_m = SECTION_M * min(section for number, section in found.vehicle if number == at)
+        track = found.courses[at].track_id
+        said.append(f"The vehicle of the scanner was left out on track {track}, from {start_m:,.0f} m on.")
     for one in found.intrusions:
         if one.what.startswith(VEHICLE_WORDS.format("")):
             said.append(

@@ -100,7 +100,7 @@ def blunt_cloud(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def gauge_folder(tmp_path_factory):
-    """A folder with a cloud, `cloud.las`, of 90 m of curve with two plates inside EBO_G1, and its lines, `lines.gpkg`."""
+    """A folder with a cloud, `cloud.las`, of 90 m of curve with two plates in EBO_G1, and its lines, `lines.gpkg`."""
     folder = tmp_path_factory.mktemp("gauge")
     scene = clearance.double_track(1, 500.0, clearance.SHORT, apart_m=0.0)
     clearance.bed(scene)

@@ -645,7 +645,7 @@ def clearance(driver: Driver) -> Iterator:
     lines = f"{GAUGE}/lines.gpkg|layername="
     dialog = yield from open_dialog("measureclearance")
     given = {"INPUT": f"{lines}centerlines", "RAILS": f"{lines}rails", "POINTS": f"{GAUGE}/cloud.las"}
-    outputs = {name: "TEMPORARY_OUTPUT" for name in ("OUTPUT", "PLATFORMS", "REPORT")}
+    outputs = dict.fromkeys(("OUTPUT", "PLATFORMS", "REPORT"), "TEMPORARY_OUTPUT")
     dialog.setParameters({**given, **outputs, "INTRUSIONS": str(driver.folder / "intrusions.gpkg"), "WIRES": None})
     driver.picture("clearance_dialog")
     driver.keep("log", (yield from press_run(dialog)))

@@ -7,6 +7,7 @@ from rail_extract.core.clearance.profiles import named
 from rail_extract.core.clearance.settings import Settings
 from rail_extract.core.clouds.points import ask
 from rail_extract.core.report.clearance import clearance_page, summary, verdict
+from rail_extract.core.report.clearance_slices import slices
 from rail_extract.core.run.loop import Runner
 from rail_extract.laboratory.curves import Element
 from rail_extract.laboratory.scenes import clearance as scenes
@@ -54,7 +55,7 @@ def test_canted_track_without_rails(measured):
 
 def test_the_page_states_profile_and_cross_section(measured):
     found = measured(0.050)
-    page = clearance_page(found, "cloud.laz", {"Command": "clearance"})
+    page = clearance_page(found, tuple(slices(found)), "cloud.laz", {"Command": "clearance"})
     assert "annex 7 picture 1" in page
     assert page.count('aria-label="Cross-section') == 1
     assert "no proof of conformity" in page
