@@ -93,7 +93,7 @@ class Clearance:
     @property
     def point_count(self) -> int:
         """Points within reach."""
-        return int(sum(one.points.sum() for one in self.stations))
+        return sum(self.swept.seen.values())
 
     def unseen(self, stations: Stations) -> np.ndarray:
         """Return which stations, (n,), have too few points around them to judge anything."""

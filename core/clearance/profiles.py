@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Optional
 
 from ..errors import ParameterError
+from ..progress import counted
 
 CUSTOM = "CUSTOM"
 """Name of a profile that the user's file states."""
@@ -101,7 +102,8 @@ def custom(points: Sequence[tuple[float, float]], name: str) -> Profile:
     """
     ring = list(dict.fromkeys(points)) if points and points[0] == points[-1] else list(points)
     if len(ring) < LEAST_POINTS:
-        raise ParameterError(f"PROFILE_FILE {name} has {len(ring)} points: an outline needs {LEAST_POINTS} or more.")
+        found = counted(len(ring), "point")
+        raise ParameterError(f"PROFILE_FILE {name} has {found}: an outline needs {LEAST_POINTS} or more.")
     if any(not max(abs(v), abs(w)) <= MAX_M for v, w in ring):
         raise ParameterError(
             f"PROFILE_FILE {name} has coordinates above {MAX_M:g} m: are these millimetres? Give metres."

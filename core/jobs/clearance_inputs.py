@@ -21,9 +21,11 @@ from .values import Values
 def read_courses(values: Values, zero: LocalFrame, progress: Progress) -> tuple[Course, ...]:
     """Read INPUT and RAILS, given the zero of the cloud.
 
-    Raises RailExtractError if the lines have no heights or heights in another unit, are too short, or if the rails are
-    of another run.
+    Raises RailExtractError if the lines are rails, have no heights or heights in another unit, are too short, or if the
+    rails are of another run.
     """
+    if "rail_id" in values.source("INPUT").fields:
+        raise RailExtractError("INPUT has rails: give the centerlines of these tracks, and the rails as RAILS.")
     lines = _lines(values, "INPUT", zero, progress)
     tracks = [replace(one, xyz=one.xyz + lines.frame.shift_to(zero)) for one in lines.centerlines()]
     flat = [one.track_id for one in tracks if not np.isfinite(one.xyz).all()]

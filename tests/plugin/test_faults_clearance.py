@@ -66,6 +66,7 @@ FAULTS = {
         "profile beside a named one": given(PROFILE_FILE=profile(HALF)),
         "widening without a rule": given(PROFILE="US_WA", WIDENING="EBO"),
         "centerlines without heights": given(INPUT=track(LINE[:, :2], kind="LineString")),
+        "rails in place of centerlines": given(INPUT=rails()),
         "centerlines without rails": given(INPUT=track(left="", right="", cant_mm=100.0)),
         "rails that RAILS lacks": given(INPUT=track(left="7", right="8", cant_mm=100.0)),
         "canted track without RAILS": given(INPUT=track(cant_mm=100.0), RAILS=None),

@@ -2,11 +2,16 @@
 
 import numpy as np
 import pytest
-from rail_extract.core.clearance.profiles import custom
-from rail_extract.core.clearance.settings import LEAVE_OUT
+from rail_extract.core.clearance.measure import measure
+from rail_extract.core.clearance.profiles import custom, named
+from rail_extract.core.clearance.settings import LEAVE_OUT, Settings
+from rail_extract.core.clouds.points import ask
+from rail_extract.core.errors import Cancelled
+from rail_extract.core.progress import Progress
+from rail_extract.core.run.loop import Runner
 from rail_extract.laboratory.curves import Element
 from rail_extract.laboratory.scenes import clearance as scenes
-from rail_extract.laboratory.scenes.clearance import SHORT, courses_of
+from rail_extract.laboratory.scenes.clearance import SHORT, courses_of, write_points
 
 HALF_M = 1.645
 """Half width of EBO_G1 above 1.17 m."""
@@ -240,3 +245,36 @@ def test_a_reversed_track_has_the_same_depths_on_the_other_side(swept, plates):
     other = swept(plates, courses=courses_of(scenes.Scene([way], 1.0, 0.0, np.random.RandomState(0))))
     assert depths(other)[::-1] == pytest.approx(depths(found), abs=2)
     assert {one.side for one in other.intrusions} == {"left", "right"}
+
+
+def test_points_out_of_reach_are_read_and_not_kept(swept):
+    scene = scene_of(STRAIGHT, 0.0)
+    scenes.plate(scene, 30.0, 1, HALF_M - 0.050, (1.5, 2.5))
+    near = swept(scene)
+    rng = np.random.RandomState(0)
+    far = rng.uniform((0.0, 12.0, 0.0), (60.0, 40.0, 6.0), (200_000, 3))
+    scene.add(*far.T, 1)
+    found = swept(scene)
+    assert found.swept.sections == near.swept.sections
+    assert found.point_count == near.point_count
+    assert found.swept.census.sum() < 250_000
+
+
+def test_a_section_of_many_points_keeps_their_number_and_the_depth(swept, plates, monkeypatch):
+    plain = swept(plates)
+    monkeypatch.setattr("rail_extract.core.clearance.section.MOST_POINTS", 1000)
+    thinned = swept(plates)
+    counts = ([one.points for one in found.intrusions] for found in (thinned, plain))
+    assert next(counts) == pytest.approx(next(counts), abs=2)
+    assert depths(thinned) == pytest.approx(depths(plain), abs=3)
+
+
+def test_a_cancelled_run_ends(tmp_path, plates):
+    class Impatient(Progress):
+        def is_cancelled(self):
+            return True
+
+    write_points(tmp_path / "cloud.laz", plates.points, plates.codes)
+    settings = Settings(named()["EBO_G1"])
+    with pytest.raises(Cancelled):
+        measure(ask(tmp_path / "cloud.laz", range(256)), courses_of(plates), settings, tmp_path, Runner(), Impatient())
