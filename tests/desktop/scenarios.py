@@ -25,7 +25,6 @@ from qgis.core import (
     QgsProject,
     QgsRectangle,
     QgsSettings,
-    QgsVectorFileWriter,
     QgsVectorLayer,
 )
 from qgis.PyQt import sip
@@ -70,9 +69,6 @@ FOLLOWING = {
     "measuretrackgeometry": "Measure the track geometry",
 }
 """Algorithms by the links that lead to them, from one single step to the next."""
-
-POOL_S = 35.0
-"""Time after which Qt has ended the thread of a run: 30 s without work, and some more."""
 
 
 class Browser(QObject):
@@ -570,7 +566,7 @@ def _follow(log: QTextEdit, text: str) -> None:
 
 
 def rails(driver: Driver) -> Iterator:
-    """Extract the sample's rails, wait, save them, and go on working with them."""
+    """Extract the sample's rails and load all results."""
     yield from install(ARCHIVE)
     dialog = yield from open_dialog("extractrails")
     dialog.mainWidget().wrappers["INPUT"].widget.combo.lineEdit().insert(SAMPLE)
@@ -581,24 +577,8 @@ def rails(driver: Driver) -> Iterator:
     results = dialog.results()
     driver.keep("results", results)
     yield from close(dialog)
-    layers = {layer.name(): layer for layer in QgsProject.instance().mapLayers().values()}
     driver.keep("layers", [node.name() for node in QgsProject.instance().layerTreeRoot().findLayers()])
     driver.picture("rails")
-    QgsProject.instance().write(str(driver.folder / "saved.qgs"))
-    yield POOL_S
-    driver.keep("systems", {name: layer.crs().toWkt() for name, layer in layers.items()})
-    driver.keep("project's system", QgsProject.instance().crs().toWkt())
-    driver.keep("new system", QgsCoordinateReferenceSystem("EPSG:32643").toWkt())
-    options = QgsVectorFileWriter.SaveVectorOptions()
-    saved = str(driver.folder / "saved.gpkg")
-    context = QgsProject.instance().transformContext()
-    QgsVectorFileWriter.writeAsVectorFormatV3(layers["Rails: sample"], saved, context, options)
-    driver.picture("rails_later")
-    dialog = yield from open_dialog("buildtrackcenterlines")
-    parameters = {"INPUT": layers["Rails: sample"].id(), "STANDARD": PART["STANDARD"]}
-    dialog.setParameters({**parameters, "OUTPUT": str(driver.folder / "tracks.gpkg")})
-    driver.keep("second log", (yield from press_run(dialog)))
-    yield from close(dialog)
 
 
 def review(driver: Driver) -> Iterator:
@@ -878,8 +858,6 @@ def model(driver: Driver) -> Iterator:
     yield from close(designer)
     layers = QgsProject.instance().mapLayers().values()
     driver.keep("layers", sorted(layer.name() for layer in layers))
-    yield POOL_S
-    driver.keep("systems", {layer.name(): layer.crs().toWkt() for layer in layers})
 
 
 def _edit(designer, step: str) -> None:

@@ -183,22 +183,6 @@ def test_rails_are_found_and_loaded(run_scenario):
     assert session["layers"] == [*(f"{title}: sample" for title in titles), "cleaned"]
 
 
-def test_systems_outlive_the_thread_of_the_run(run_scenario):
-    session = run_scenario("rails")
-    systems = [*session["systems"].values(), session["project's system"], session["new system"]]
-    assert ["UTM zone 43N" in wkt for wkt in systems] == [True] * 7
-    assert ["UTM zone 43N" in wkt for wkt in run_scenario("model")["systems"].values()] == [True] * 3
-
-
-@pytest.mark.parametrize(("name", "count"), [("saved.gpkg", 6), ("tracks.gpkg", 3)])
-def test_saved_lines_are_complete(run_scenario, name, count):
-    dataset = ogr.Open(str(run_scenario("rails").folder / name))  # GDAL crashes if nothing refers to it
-    layer = dataset.GetLayer(0)
-    assert layer.GetSpatialRef().GetAuthorityCode(None) == "32643"
-    assert layer.GetFeatureCount() == count
-    assert layer.GetGeomType() == ogr.wkbLineString25D
-
-
 def test_saved_raster_has_its_system(run_scenario):
     dataset = gdal.Open(str(run_scenario("rails").folder / "cleaned.tif"))
     assert dataset.GetSpatialRef().GetAuthorityCode(None) == "32643"
