@@ -49,8 +49,8 @@ from qgis.PyQt.QtWidgets import (
 )
 from qgis.utils import iface, loadPlugin, plugins, reloadPlugin, startPlugin, unloadPlugin
 
-RAW, BLUNT, LABELLED, SAMPLE, ARCHIVE = (
-    os.environ[f"RAIL_EXTRACT_{name}"] for name in ("RAW", "BLUNT", "LABELLED", "SAMPLE", "ZIP")
+RAW, BLUNT, LABELLED, GAUGE, SAMPLE, ARCHIVE = (
+    os.environ[f"RAIL_EXTRACT_{name}"] for name in ("RAW", "BLUNT", "LABELLED", "GAUGE", "SAMPLE", "ZIP")
 )
 PART = {
     "STANDARD": "IN_75R_1000",
@@ -616,6 +616,41 @@ def review(driver: Driver) -> Iterator:
     driver.picture("review_rejected")
     driver.keep("order", [node.name() for node in QgsProject.instance().layerTreeRoot().findLayers()])
     yield from _show_in_3d(driver, menu)
+
+
+def clearance(driver: Driver) -> Iterator:
+    """Measure clearance from the dialog, and step through the intrusions in the dock."""
+    yield from install(ARCHIVE)
+    browser, project = Browser(), QgsProject.instance()
+    lines = f"{GAUGE}/lines.gpkg|layername="
+    dialog = yield from open_dialog("measureclearance")
+    given = {"INPUT": f"{lines}centerlines", "RAILS": f"{lines}rails", "POINTS": f"{GAUGE}/cloud.las"}
+    outputs = dict.fromkeys(("OUTPUT", "PLATFORMS", "REPORT"), "TEMPORARY_OUTPUT")
+    dialog.setParameters({**given, **outputs, "INTRUSIONS": str(driver.folder / "intrusions.gpkg"), "WIRES": None})
+    driver.picture("clearance_dialog")
+    driver.keep("log", (yield from press_run(dialog)))
+    yield from close(dialog)
+    driver.keep("opened", browser.urls)
+    layers = list(project.mapLayers().values())
+    driver.keep("layers", {layer.name(): layer.featureCount() for layer in layers})
+    found = next(layer for layer in layers if layer.fields().lookupField("pen_mm") >= 0)
+    driver.keep("depths", [one["pen_mm"] for one in found.getFeatures()])
+    dock = iface.mainWindow().findChild(QDockWidget, "RailExtractReview")
+    driver.keep("dock is visible", dock.isVisible())
+    yield lambda: not dock.is_reading
+    dock.go(0)
+    seen: dict[str, list] = {"counts": [], "reasons": [], "marks": [], "points": []}
+    for press in ("accepted", "next"):
+        yield 1.0
+        driver.picture(f"clearance_{press}")
+        seen["counts"].append(dock.count.text())
+        seen["reasons"].append(dock.reason.text())
+        seen["marks"].append(dock.view.picture.mark.tolist())
+        seen["points"].append(len(dock.view.picture.points))
+        dock.buttons[press].click()
+    for name, values in seen.items():
+        driver.keep(name, values)
+    driver.keep("decisions", [one["review"] for one in found.getFeatures()])
 
 
 def _show_in_3d(driver: Driver, menu: QMenu) -> Iterator:
