@@ -19,7 +19,6 @@ from qgis.core import (
 )
 from rail_extract.core.disk import PREFIX
 from rail_extract.core.kernels import blas
-from rail_extract.core.run import processes
 
 POINTS = f"{PREFIX}*/*/10_*"
 """Files with temporary points of class 10."""
@@ -42,20 +41,6 @@ def lines_of(path):
     layer = QgsVectorLayer(str(path), "lines", "ogr")
     assert layer.isValid()
     return layer, list(layer.getFeatures())
-
-
-def test_rails_and_centerlines_are_written_as_reported(run, scene, outputs):
-    outcome = run({**scene, **outputs})
-    assert outcome.ok, outcome.error
-    for name, figure in (("RAILS", "RAIL"), ("CENTERLINES", "CENTERLINE")):
-        layer, features = lines_of(outputs[name])
-        assert layer.crs().authid() == "EPSG:32643"
-        assert layer.wkbType() == 1002  # LineStringZ
-        assert outcome.results[f"{figure}_COUNT"] == len(features) > 0
-        assert outcome.results[f"{figure}_LENGTH"] == pytest.approx(
-            sum(feature["length_m"] for feature in features), abs=0.01
-        )
-    assert outcome.results["ENGINE_USED"].startswith("PyTorch" if find_spec("torch") else "OpenCV")
 
 
 @pytest.mark.skipif(not find_spec("rasterio"), reason="needs the packages of the cluster")
@@ -192,14 +177,6 @@ def test_the_log_names_steps_figures_and_verdict(run, scene, new_feedback, tmp_p
         assert re.fullmatch(pattern, said), said
 
 
-def test_rail_standard_is_detected(run, write_cloud, track, new_feedback, tmp_path):
-    feedback, rails = new_feedback(), tmp_path / "rails.gpkg"
-    outcome = run({"INPUT": write_cloud(track()), "STANDARD": "DETECT", "ITERATIONS": 1, "RAILS": rails}, feedback)
-    assert outcome.ok, outcome.error
-    assert outcome.results["CENTERLINE_COUNT"] == 1
-    assert "Detected EN 60E1 (UIC 60), 1435 mm (EN_60E1_1435): rails are 1507 mm apart" in feedback.said()
-
-
 @pytest.mark.skipif(not blas(), reason="This numpy has a BLAS that knows one thread only.")
 @pytest.mark.parametrize("ends", ["well", "badly"])
 def test_libraries_have_one_thread_during_a_run_and_as_many_as_before_afterwards(run, scene, new_feedback, ends):
@@ -214,22 +191,3 @@ def test_libraries_have_one_thread_during_a_run_and_as_many_as_before_afterwards
     finally:
         for one, threads in zip(blas(), before):
             one.set(threads)
-
-
-def test_worker_processes_give_the_same_lines(run, write_cloud, track, tmp_path, new_feedback, monkeypatch):
-    monkeypatch.setattr(processes, "WORTH_S", 0.0)
-    tiles = tmp_path / "täg les"
-    tiles.mkdir()
-    for number in range(3):
-        write_cloud(track() + [12.0 * number, 0, 0], f"{number}.las", folder=tiles)
-    found, said = [], []
-    for count in (1, 2):
-        feedback, rails = new_feedback(), tmp_path / f"{count}.gpkg"
-        assert run({"INPUT": tiles, "ITERATIONS": 1, "WORKERS": count, "RAILS": rails}, feedback).ok
-        found.append([(xyz.tolist(), items) for xyz, items in read_features(rails)])
-        said.append(feedback.infos)
-    assert len(found[0]) == 2
-    assert found[0] == found[1]
-    assert [text for text in said[1] if text.startswith("Up to 2 worker processes")] == [
-        text for text in said[1] if text not in said[0]
-    ]
