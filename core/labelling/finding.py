@@ -12,9 +12,10 @@ from pathlib import Path
 import numpy as np
 
 from ..classify.guide import MIDDLE_M, Guide
-from ..classify.settings import MARGIN_M, Settings
-from ..classify.sharpness import search_alike
+from ..classify.settings import MARGIN_M, Settings, Way
 from ..classify.square import Classified, classify_square
+from ..classify.tops import LOW_M
+from ..classify.ways import search_alike
 from ..clouds.points import Request, read_each
 from ..clouds.readers import CloudHeader, read_points, shows_scanner
 from ..errors import CloudError, NoRailPointsError, ParameterError
@@ -77,9 +78,9 @@ def find_rail_points(
     progress.status("Searching for rails")
     searched = 0
 
-    def search(keys: Sequence[Key], blunt: bool) -> Iterator[Found]:
+    def search(keys: Sequence[Key], way: Way) -> Iterator[Found]:
         nonlocal searched
-        own = replace(settings, blunt=blunt)
+        own = replace(settings, way=way)
         tasks = {key: _search_task(key, sorted_files, request.zero, own) for key in keys}
         start, searched = searched, min(searched + len(keys), len(counts))
         share = searching.span(start / len(counts), searched / len(counts))
@@ -162,6 +163,11 @@ def report(figures: SearchFigures, request: Request, progress: Progress) -> None
             f"Heads are blunt on {figures.blunt_m:.0f} m of rail: the cloud blurs what it shows by "
             f"{100 * figures.blur_m:.0f} cm{_as_from_images(request)}, so that a head is a round ridge. A ridge "
             "counts as a rail only if it is long and has a partner at the distance of the gauge."
+        )
+    if figures.filled_m:
+        progress.warning(
+            f"{figures.filled_m:.0f} m of rails stand hardly {100 * LOW_M:.0f} cm out of their bed: boards and edges "
+            "are as low, so look at what was found."
         )
 
 

@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core.classify.settings import MARGIN_M, Settings
-from ...core.classify.sharpness import search_alike
+from ...core.classify.settings import MARGIN_M, Settings, Way
 from ...core.classify.square import Classified
+from ...core.classify.ways import search_alike
 from ...core.grow.heads import GrowSettings, OnHeads, Rail
 from ...core.labelling.finding import search_square
 from ...core.progress import SILENT, Progress
@@ -38,11 +38,11 @@ def classify_cloud(xyz: np.ndarray, settings: Settings, progress: Progress = SIL
     context = Context({}, Once(), progress)
     around_them = Tiling(settings.side_m, MARGIN_M).sort(xyz)
 
-    def search(some: Sequence[Key], blunt: bool) -> Iterator[Part]:
+    def search(some: Sequence[Key], way: Way) -> Iterator[Part]:
         for key in progress.follow(some):
             number = around_them[key]
             corner = np.array([*np.multiply(key, settings.side_m), 0.0])
-            found = search_square(xyz[number] - corner, replace(settings.at(key), blunt=blunt), context)
+            found = search_square(xyz[number] - corner, replace(settings.at(key), way=way), context)
             yield Part(number[found.rail], found.figures)
 
     for part in search_alike([keys[place] for place in np.argsort(-np.bincount(square), kind="stable")], search):
