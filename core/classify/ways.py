@@ -58,7 +58,7 @@ def _round_m(seen: SearchFigures) -> float:
 
 def shows_no_rails(seen: SearchFigures) -> bool:
     """Return whether a cloud shows too few rails to tell, by the sum of the figures of all of its parts."""
-    return seen.paired_m < SHARP_M
+    return seen.paired_m + seen.single_m < SHARP_M
 
 
 def search_alike(parts: Sequence[Part], search: Callable[[Sequence[Part], Way], Iterable[Answer]]) -> Iterator[Answer]:
