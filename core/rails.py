@@ -407,7 +407,7 @@ class SearchFigures:
     blur_m2 : float
         The blur there, a standard deviation, times this length.
     filled_m : float
-        Length of rails in a cloud that was searched for heads just above the ballast.
+        Length of the rails just above the ballast, in a cloud that was searched for them.
     sharp_m, round_m : float
         Length of the rails with a partner that are as narrow as a head, and of those that are wider and round, before
         the cloud is known to be blunt; see `classify.ways`.

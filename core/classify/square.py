@@ -27,7 +27,7 @@ from .pieces import (
 )
 from .ridges import Ridges, cells_beside, on_crests
 from .settings import BLUNT, MARGIN_M, Settings, Tolerances, Way
-from .tops import HIGH_M, MILLIMETRES, Band, Grid, Tops, highest_of_blocks, middles_of_tops, narrow_tops, tops_of
+from .tops import HIGH_M, LOW_M, MILLIMETRES, Band, Grid, Tops, highest_of_blocks, middles_of_tops, narrow_tops, tops_of
 
 THIN_PER_M2 = 400.0
 """Points per square metre below which a square is thin: no scanner on a vehicle, or far from it."""
@@ -326,7 +326,7 @@ def _standing_figures(standing: Standing, settings: Settings) -> SearchFigures:
         across_m=float(across_m),
         blunt_m=blunt_m,
         blur_m2=blunt_m * standing.blur_m,
-        filled_m=float(share_m.sum()) if settings.way is Way.FILLED else 0.0,
+        filled_m=float(share_m[kept.lines.height < LOW_M].sum()) if settings.way is Way.FILLED else 0.0,
         sharp_m=standing.sharp_m,
         round_m=standing.round_m,
         unsure_m=standing.unsure_m,

@@ -20,6 +20,9 @@ SHARP_M = 20.0
 BLUNT_M = 100.0
 """Length of round rails that shows a cloud without these to be blunt; the rest of it need not be seen."""
 
+STRAY_M = 5.0
+"""Length of rails up to which a cloud shows none: shorter ones are strays."""
+
 FIRST_PARTS = 4
 """Parts of a cloud that are searched first to find out; then as many again as were searched, until enough rails are
 seen."""
@@ -57,8 +60,8 @@ def _round_m(seen: SearchFigures) -> float:
 
 
 def shows_no_rails(seen: SearchFigures) -> bool:
-    """Return whether a cloud shows too few rails to tell, by the sum of the figures of all of its parts."""
-    return seen.paired_m + seen.single_m < SHARP_M
+    """Return whether a cloud shows strays at most, by the sum of the figures of all of its parts."""
+    return seen.paired_m + seen.single_m < STRAY_M
 
 
 def search_alike(parts: Sequence[Part], search: Callable[[Sequence[Part], Way], Iterable[Answer]]) -> Iterator[Answer]:
