@@ -1,12 +1,13 @@
 """Whether a cloud is sharp or blunt: a property of the scanner or camera, hence of the cloud and not of a square.
 
-Rails are the only things of known width. A cloud that shows some of them as narrow as their heads is sharp, whatever
-else it shows (docs/classification.md).
+Where a cloud has several sources, scanners and cameras, each of them is sharp or blunt. Rails are the only things of
+known width. A cloud that shows some of them as narrow as their heads is sharp, whatever else it shows
+(docs/classification.md).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Protocol, TypeVar
 
 from ..rails import SearchFigures
@@ -52,6 +53,39 @@ def _round_m(seen: SearchFigures) -> float:
     These are rather those of a sharp cloud. But images of smooth ground showed 29 m of rails in pavements, by chance.
     """
     return seen.round_m - seen.unsure_m
+
+
+def blunt_among(seen: Mapping[int, SearchFigures]) -> frozenset[int]:
+    """Return the sources of a cloud that are blunt while others are sharp, by the figures of each.
+
+    There are none unless both kinds show enough rails to be certain: a cloud of one kind is left as it is.
+    """
+    if not any(figures.sharp_m >= SHARP_M for figures in seen.values()):
+        return frozenset()
+    return frozenset(one for one, figures in seen.items() if is_decided(figures) and is_blunt(figures))
+
+
+def blunt_sources(
+    parts: Mapping[int, Sequence[Part]],
+    search: Callable[[Sequence[tuple[int, Part]]], Iterable[tuple[int, SearchFigures]]],
+) -> frozenset[int]:
+    """Return the blunt sources of a cloud that has sharp ones as well, see `blunt_among`.
+
+    Given are the parts of the cloud in which each source has points, those with most of them first. `search` searches
+    parts for the rails of one source each, as if it were sharp, and yields the source and its figures.
+    """
+    seen = dict.fromkeys(parts, SearchFigures())
+    done, step = 0, 1
+    while len(parts) > 1:
+        batch = [
+            (one, part) for one, own in parts.items() if not is_decided(seen[one]) for part in own[done : done + step]
+        ]
+        if not batch:
+            break
+        for one, figures in search(batch):
+            seen[one] += figures
+        done, step = done + step, done + step
+    return blunt_among(seen)
 
 
 def search_alike(parts: Sequence[Part], search: Callable[[Sequence[Part], bool], Iterable[Answer]]) -> Iterator[Answer]:

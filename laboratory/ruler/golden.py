@@ -23,6 +23,7 @@ from ..designs import TRACKS, TrackScene
 from ..scenes.adversarial import ADVERSARIAL
 from ..scenes.catalogue import SCENES
 from ..scenes.layouts import LAYOUTS
+from ..scenes.mixed import MIXED, RAW_MIXED
 from ..scenes.raw import RawScene
 from ..scenes.raw_catalogue import AIR, RAW_SCENES
 from ..scenes.scene import Scene
@@ -35,14 +36,14 @@ from .measuring import QUALITY_STEP_M, local_sigma
 
 AnyScene = Union[Scene, RawScene, FlownScene, TrackScene]
 
-DRAWN: dict[str, Callable[..., Scene]] = {**SCENES, **ADVERSARIAL, **LAYOUTS, **WHOLE}
+DRAWN: dict[str, Callable[..., Scene]] = {**SCENES, **ADVERSARIAL, **LAYOUTS, **WHOLE, **MIXED}
 """Scenes of classified points, by name."""
 
 RAW, GUIDED, FITTED = "raw ", "guide ", "fit "
 """What the names of raw scenes begin with, of those that are flown, and of tracks to which alignments are fitted."""
 
 SEEDED: dict[str, tuple[Callable[[int], AnyScene], int]] = {
-    **{RAW + name: (make, 2026) for name, make in RAW_SCENES.items()},
+    **{RAW + name: (make, 2026) for name, make in {**RAW_SCENES, **RAW_MIXED}.items()},
     **{GUIDED + name: (make, 3) for name, make in FLOWN.items()},
     **{FITTED + name: (make, 7) for name, make in TRACKS.items()},
 }
@@ -55,7 +56,7 @@ QUICK = (
     *("straight", "tram", "turnout_7", "turnout_26", "crossover", "dual_gauge", "noisy", "sparse"),
     *("ballast", "platform", "gaps", "thin_points", "strips_meet", "double_slip", "three_way_apart", "side_30"),
     *("crossing", "standing_train", "grooved", "near_tracks", "flyover", "parked_train"),
-    *("whole_tenth", "whole_side", "whole_turnout"),
+    *("whole_tenth", "whole_side", "whole_turnout", "mixed_half_scanned"),
     *("raw turnout 1:9", "raw metro", "raw crossing", "raw air 80", "raw photo curve", "raw car park"),
     *(GUIDED + name for name in FLOWN),
     *(FITTED + name for name in TRACKS),
