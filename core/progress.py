@@ -22,6 +22,9 @@ SURE_FACTOR = 2.0
 """Factor by which the speed may differ between the third and the last quarter of an activity; where it differs more,
 the remaining time is not known."""
 
+READING = 0.3
+"""Share of the progress of a job that reading its inputs takes, at most."""
+
 LEAST_LEFT_S = 10.0
 """Remaining time below which none is reported: the estimate would be gone before it is read."""
 
@@ -72,6 +75,10 @@ class Progress:
         """Return the progresses of steps of this one, in proportion to their weights."""
         ends = list(accumulate(weights))
         return [self.span((end - weight) / ends[-1], end / ends[-1]) for weight, end in zip(weights, ends)]
+
+    def after_reading(self) -> tuple[Progress, Progress]:
+        """Return the progress of reading the inputs of a job, and that of what follows."""
+        return self.span(0, READING), self.span(READING, 1)
 
     @overload
     def follow(self, items: Collection[Item]) -> Iterator[Item]: ...

@@ -14,9 +14,6 @@ if TYPE_CHECKING:
     from .result import Result
     from .values import Values
 
-READING = 0.1
-"""Fraction of the progress bar for reading the lines."""
-
 
 def _check(values: Values) -> None:
     """Check the rail and the gauges."""
@@ -30,9 +27,10 @@ def _run(values: Values, progress: Progress) -> Result:
     from ..tracks.centerlines import tracks_of
     from .result import Result
 
-    lines, standard = values.lines("INPUT", progress.span(0, READING)), values.standard()
+    reading, pairing = progress.after_reading()
+    lines, standard = values.lines("INPUT", reading), values.standard()
     rails = lines.rails(progress)
-    tracks = tracks_of(rails, values.settings(standard, values.other_gauges(standard)), progress.span(READING, 1))
+    tracks = tracks_of(rails, values.settings(standard, values.other_gauges(standard)), pairing)
     progress.check()
     layers = {
         "OUTPUT": lambda: lines_layer(CENTERLINES, tracks),

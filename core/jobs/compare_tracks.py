@@ -32,9 +32,6 @@ if TYPE_CHECKING:
     from .result import Result
     from .values import Values
 
-READING, COMPARING = 0.3, 0.9
-"""Fractions of the progress bar at which the lines are read, and at which they are compared."""
-
 SURVEYS = {"REFERENCE": ("REFERENCE_RAILS", "REFERENCE_SIGMA"), "INPUT": ("RAILS", "INPUT_SIGMA")}
 """Rails and standard error of each survey, by its lines."""
 
@@ -73,11 +70,12 @@ def _run(values: Values, progress: Progress) -> Result:
     from ..report.comparison import build_comparison, describe_shift, verdict_on
     from .result import Result
 
-    earlier, later = progress.span(0, READING).split(2)
+    reading, comparing = progress.after_reading()
+    earlier, later = reading.split(2)
     reference, frame = _survey(values, "REFERENCE", None, earlier)
     other, _ = _survey(values, "INPUT", frame, later)
     settings = ComparisonParameters(values["REACH"], values["STEP"], values["IGNORE_SHIFT"])
-    found = compare_surveys(reference, other, settings, progress.span(READING, COMPARING))
+    found = compare_surveys(reference, other, settings, comparing)
     progress.check()
     for sentence in doubts_of(found):
         progress.warning(sentence)

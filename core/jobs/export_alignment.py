@@ -24,9 +24,6 @@ if TYPE_CHECKING:
     from .result import Result
     from .values import Values
 
-READING, CHECKED = 0.5, 0.7
-"""Fractions of the progress bar at which the table is read, and checked."""
-
 CIRCLES, PARABOLAS = VERTICAL_CURVES = ("CIRCLES", "PARABOLAS")
 
 
@@ -45,11 +42,13 @@ def _run(values: Values, progress: Progress) -> Result:
     from .lines import read_elements
     from .result import Result
 
-    alignments = read_elements(values, "INPUT", values["CRS"], progress.span(0, READING))
-    check_designs(alignments, progress.span(READING, CHECKED))
+    reading, rest = progress.after_reading()
+    checking, writing = rest.split(2)
+    alignments = read_elements(values, "INPUT", values["CRS"], reading)
+    check_designs(alignments, checking)
     circles, destination = values["VERTICAL_CURVES"] == CIRCLES, values.destination("OUTPUT")
     with destination.replacing() as new:
-        write_designs(new, alignments, values.standard(), circles, VERSION, progress.span(CHECKED, 1))
+        write_designs(new, alignments, values.standard(), circles, VERSION, writing)
     count = sum(len(alignment.elements) for alignment in alignments)
     figures = {"OUTPUT": str(destination.path), "ALIGNMENT_COUNT": len(alignments), "ELEMENT_COUNT": count}
     said = f"{len(alignments)} alignments, {count} elements"

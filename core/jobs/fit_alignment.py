@@ -31,9 +31,6 @@ if TYPE_CHECKING:
     from .result import Result
     from .values import Values
 
-READING, FITTING = 0.1, 0.95
-"""Fractions of the progress bar at which lines are read, and at which they are fitted."""
-
 MIN_FIT_TOLERANCE_MM, MAX_ELEMENT_M = 0.1, 1000.0
 """No scanner resolves a smaller tolerance, and no element that is left out on purpose is longer."""
 
@@ -56,10 +53,11 @@ def _run(values: Values, progress: Progress) -> Result:
     from .result import Result
 
     progress = Recording(progress)
-    tracks, frame = read_tracks(values, "INPUT", progress.span(0, READING))
+    reading, fitting = progress.after_reading()
+    tracks, frame = read_tracks(values, "INPUT", reading)
     held = read_elements(values, "FIXED", frame.crs_wkt) if values.filled("FIXED") else []
     settings = FitParameters(values["TOLERANCE"] / 1000.0, values["MIN_LENGTH"], values["TRANSITIONS"], values["ROUND"])
-    fits = fit_tracks(tracks, frame, settings, {one.track_id: one for one in held}, progress.span(READING, FITTING))
+    fits = fit_tracks(tracks, frame, settings, {one.track_id: one for one in held}, fitting)
     alignments, deviations = [one.alignment for one in fits], [one.deviations for one in fits]
     courses, facts = list(zip(alignments, deviations)), {"Command": values.command}
     return Result(

@@ -18,9 +18,6 @@ if TYPE_CHECKING:
     from .result import Result
     from .values import Values
 
-READING = 0.05
-"""Fraction of the progress bar for reading the raster."""
-
 CELL_TOLERANCE = 0.03
 """Relative deviation allowed from the cell size that the network expects; its training covered such a deviation."""
 
@@ -67,9 +64,10 @@ def _run(values: Values, progress: Progress) -> Result:
 
     header, model = _planned(values)
     engine = make_engine(load_arrays(model.path), values["ENGINE"], values["DEVICE"])
-    rasters = values.raster("INPUT").read(progress.span(0, READING))
+    reading, cleaning = progress.after_reading()
+    rasters = values.raster("INPUT").read(reading)
     progress.info(f"Network {model.name}, {engine.description}.")
-    shares = progress.span(READING, 1).split(len(rasters))
+    shares = cleaning.split(len(rasters))
     cleaned = [clean(raster, engine, values["ITERATIONS"], share) for raster, share in zip(rasters, shares)]
     for code, before, after in zip(header.class_codes, rasters, cleaned):
         progress.info(f"Class {code}: {before.count():,} rail cells before, {after.count():,} after.")

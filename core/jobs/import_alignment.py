@@ -28,9 +28,6 @@ if TYPE_CHECKING:
     from .result import Result
     from .values import Values
 
-READING = 0.7
-"""Fraction of the progress bar at which the file is read."""
-
 
 def _check(values: Values) -> None:
     """Check that tracks are given where they are needed, and the coordinate system of the file."""
@@ -70,11 +67,12 @@ def _run(values: Values, progress: Progress) -> Result:
     from .result import Result
 
     progress, path = Recording(progress), values["INPUT"]
-    read = read_landxml(path, values["EAST_FIRST"], progress.span(0, READING))
+    reading, comparing = progress.after_reading()
+    read = read_landxml(path, values["EAST_FIRST"], reading)
     frame = replace(read[0].frame, crs_wkt=_system(values))
     alignments = [replace(one, frame=frame) for one in read]
     check_place(path.name, frame, values["EAST_FIRST"], progress)
-    courses = _compared(values, alignments, progress.span(READING, 1))
+    courses = _compared(values, alignments, comparing)
     facts = {"LandXML file": path.name, "Command": values.command}
     count = sum(len(alignment.elements) for alignment in alignments)
     layers = {"ELEMENTS": lambda: elements_layer(alignments, progress), "AXIS": lambda: axes_layer(alignments)}

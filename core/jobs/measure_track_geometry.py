@@ -20,9 +20,6 @@ if TYPE_CHECKING:
     from .result import Result
     from .values import Values
 
-READING, MEASURING = 0.3, 0.9
-"""Fractions of the progress bar at which lines and cloud are read, and at which the rails are measured."""
-
 
 def _check(values: Values) -> None:
     """Check the rail, the gauges and the axis."""
@@ -57,11 +54,12 @@ def _run(values: Values, progress: Progress) -> Result:
     other_gauges = values.other_gauges(standard) if standard else ()
     gauges = ((standard.gauge_m if standard else 0.0, head_width_m), *other_gauges)
     with values.scratch() as folder, values.runner() as runner:
-        tracks = read_inputs(values, folder, progress.span(0, READING))
-        measuring = progress.span(READING, MEASURING)
+        reading, rest = progress.after_reading()
+        measuring, share = rest.split(2)
+        tracks = read_inputs(values, folder, reading)
         heads_m = widths_by_gauge(tracks.rails, gauges, Parameters.centerline_tolerance_m)
         rails = measure_rails(tracks.rails, tracks.clouds, heads_m, runner, measuring)
-    share, step_m, frame = progress.span(MEASURING, 1), values["STEP"], tracks.frame
+    step_m, frame = values["STEP"], tracks.frame
     measured = measure_track_geometry(tracks.centerlines, rails, head_width_m, step_m, share, gauges)
     check_gauges(tracks, measured, progress)
     progress.check()

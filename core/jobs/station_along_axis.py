@@ -18,9 +18,6 @@ if TYPE_CHECKING:
     from .result import Result
     from .values import Values
 
-READING, LOCATING = 0.3, 0.7
-"""Fractions of the progress bar at which the features are read, and at which they have their kilometres."""
-
 
 def _check(values: Values) -> None:
     """Check that the layer has places, and read the axis."""
@@ -52,15 +49,17 @@ def _run(values: Values, progress: Progress) -> Result:
     from ..rails import Kilometres
     from .result import Result
 
+    reading, rest = progress.after_reading()
+    locating, reaching = rest.split(2)
     plane = _plane(values)
     axes = values.axes(plane)
-    places = values.places("INPUT", plane, progress.span(0, READING))
+    places = values.places("INPUT", plane, reading)
     known = axes.on_map(places.xy, places.ids, progress)
     found = Kilometres.empty(len(places.ids))
-    found.put(known, axes.locate(places.xy[known], progress.span(READING, LOCATING)))
+    found.put(known, axes.locate(places.xy[known], locating))
     columns = [getattr(found, one.name) for one in STATION_FIELDS]
     if not places.are_points:
-        columns += _extents_km(places, known, axes, progress.span(LOCATING, 1.0))
+        columns += _extents_km(places, known, axes, reaching)
     fields = (*STATION_FIELDS, *EXTENT_FIELDS)[: len(columns)]
     count = int(np.isfinite(found.km).sum())
     figures = {

@@ -18,9 +18,6 @@ if TYPE_CHECKING:
     from .result import Result
     from .values import Values
 
-READING = 0.3
-"""Fraction of the progress bar for reading raster and cloud."""
-
 
 def _standard(values: Values) -> RailStandard:
     """Return the rails of the raster, whose header is checked."""
@@ -41,10 +38,12 @@ def _run(values: Values, progress: Progress) -> Result:
     from .result import Result, ShownCloud
 
     source, header = values.raster("INPUT"), values.raster("INPUT").header
-    rasters, frame, clouds = source.read(progress.span(0, READING / 2)), header.frame, {}
+    reading, drawing = progress.after_reading()
+    of_raster, of_cloud = reading.split(2)
+    rasters, frame, clouds = source.read(of_raster), header.frame, {}
     if values.filled("POINTS"):
         area = Area("raster", header.class_codes, header.bounds, header.frame)
-        clouds = read_points_in(area, values.cloud("POINTS"), progress.span(READING / 2, READING))
+        clouds = read_points_in(area, values.cloud("POINTS"), of_cloud)
         frame = clouds[header.class_codes[0]].frame
         rasters = tuple(moved(raster, header.frame, frame) for raster in rasters)
     else:
@@ -52,8 +51,7 @@ def _run(values: Values, progress: Progress) -> Result:
     standard = _standard(values)
     settings = values.settings(standard)
     rails: list[RailLine] = []
-    shares = progress.span(READING, 1).split(len(rasters))
-    for raster, code, share in zip(rasters, header.class_codes, shares):
+    for raster, code, share in zip(rasters, header.class_codes, drawing.split(len(rasters))):
         found = lines_of(raster, code, clouds.get(code), settings, share, first_id=len(rails) + 1)
         warn_of_rails(found, code, settings, progress)
         rails += found

@@ -54,9 +54,6 @@ CLEAN_S, DRAW_S = 1.5e-5, 2.5e-5
 """Run times per point, in seconds, of the two tasks of a square: cleaning its raster with the network, and drawing its
 lines. At 400 points per metre of track, a kilometre takes 15 s."""
 
-REMEASURE, STATIONS = 0.8, 0.2
-"""Run times of the two steps of the track geometry: the heights of the rails, and the stations."""
-
 
 def extract_rails(
     points: Sequence[RailPoints | PointSource], parameters: Parameters, progress: Progress = SILENT
@@ -349,7 +346,7 @@ def _measured(
     """Measure the geometry of all tracks, class by class, if it is asked for; see `gauge_scatter` for `beyond_m`."""
     if parameters.quality_step_m is None:
         return network
-    remeasuring, stations = progress.divide((REMEASURE, STATIONS))
+    remeasuring, stations = progress.split(2)
     align = parameters.strips == ALIGNED
     heads_m = widths_by_gauge(network.rails, parameters.gauges, parameters.centerline_tolerance_m)
     measured = measure_rails(network.rails, points.classes, heads_m, runner, remeasuring, align)

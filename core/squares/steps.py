@@ -34,9 +34,6 @@ from ..tracks.parallels import widths_by_gauge
 from ..vectorize import vectorize
 from .seams import SquareRails, join, trim
 
-VECTORIZE, SMOOTH, REFINE, ELEVATE = 0.45, 0.05, 0.25, 0.25
-"""Relative run times of the steps from a raster to lines, for the progress."""
-
 
 def square_side(parameters: Parameters) -> float:
     """Return the side of the squares in metres; `ParameterError` if they overlap with more than their neighbours."""
@@ -160,7 +157,7 @@ def _all_vertices(
 
     Also returns the offsets of strips, see `strips.rows_of`, and whether heads are blunt, see `RailPoints`.
     """
-    drawing, measuring = progress.divide((VECTORIZE + SMOOTH, REFINE + ELEVATE))
+    drawing, measuring = progress.split(2)
     network = draw_lines(raster, parameters, drawing)
     if points is not None:
         points = judged(points, network.lines, parameters.head_width_m)
@@ -170,16 +167,15 @@ def _all_vertices(
 
 def draw_lines(raster: RailRaster, parameters: Parameters, progress: Progress = SILENT) -> LineNetwork:
     """Draw the smoothed lines that a cleaned raster shows."""
-    vectorizing, smoothing = progress.divide((VECTORIZE, SMOOTH))
     network = vectorize(
         raster,
         parameters.head_width_m,
         parameters.max_gap_m,
         parameters.gap_angle_deg,
         parameters.min_length_m,
-        vectorizing,
+        progress,
     )
-    return smooth_network(network, parameters.smoothing_xy_m, smoothing)
+    return smooth_network(network, parameters.smoothing_xy_m, progress.span(1.0, 1.0))
 
 
 def measure_lines(
@@ -191,7 +187,7 @@ def measure_lines(
     progress: Progress = SILENT,
 ) -> tuple[tuple[RailLine, ...], np.ndarray]:
     """Move the lines of `draw_lines` onto their heads and measure them; see `_all_vertices`."""
-    refining, elevating = progress.divide((REFINE, ELEVATE))
+    refining, elevating = progress.split(2)
     elevation = ElevationParameters(
         tolerance_xy_m=parameters.tolerance_xy_m,
         tolerance_z_m=parameters.tolerance_z_m,

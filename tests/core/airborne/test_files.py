@@ -10,7 +10,6 @@ from rail_extract.core.airborne.files import Run, survey_files
 from rail_extract.core.airborne.survey import FLIGHT, GuideLine
 from rail_extract.core.clouds.header import catalogue_text
 from rail_extract.core.clouds.points import ask
-from rail_extract.core.errors import CloudError, NoRailPointsError, ParameterError
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.parameters import AirborneParameters
 from rail_extract.core.run.loop import Runner
@@ -145,25 +144,6 @@ def test_a_wrong_gauge_and_a_short_guide_are_said(flown, cloud, tmp_path, change
     found = survey(cloud, given, tmp_path, replace(PARAMETERS, gauge_m=run_gauge_m))
     assert [line.guide_id for line in found.lines] == seen
     assert found.warnings == (warning,)
-
-
-def test_a_guide_outside_of_the_cloud_is_refused(flown, cloud, tmp_path):
-    with pytest.raises(ParameterError, match="No guide lies in the cloud"):
-        survey(cloud, guides(flown, (5000.0, 0.0)), tmp_path)
-    with pytest.raises(ParameterError, match="in degrees"):
-        survey(cloud, [GuideLine(1, np.array([[9.0, 49.6], [9.001, 49.7]]))], tmp_path)
-
-
-def test_other_classes_and_dense_clouds_are_refused(flown, tmp_path):
-    write_airborne(flown.cloud, tmp_path / "cloud.laz", class_code=6)
-    with pytest.raises(NoRailPointsError, match="no points of class 1, 2 along the guides"):
-        survey(tmp_path / "cloud.laz", guides(flown), tmp_path)
-    near = np.abs(flown.cloud.xyz - flown.design.truth(0)[400]).max(axis=1) < 16
-    dense = np.repeat(flown.cloud.xyz[near], 70, axis=0)
-    dense[:, :2] += np.random.RandomState(1).uniform(-0.3, 0.3, (len(dense), 2))
-    write_airborne(AirborneCloud(dense, np.zeros(len(dense), int)), tmp_path / "dense.laz")
-    with pytest.raises(CloudError, match="use Extract Rails"):
-        survey(tmp_path / "dense.laz", guides(flown), tmp_path)
 
 
 def test_a_sparse_cloud_with_a_wide_footprint_is_a_hint(flown, tmp_path):

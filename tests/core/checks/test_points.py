@@ -134,11 +134,6 @@ def test_rails_of_an_airborne_cloud_give_a_warning(per_metre, said):
     assert all(said in text and "use Track Centerlines from Airborne Lidar" in text for text in heard.warnings)
 
 
-def test_points_as_thin_as_those_of_an_airborne_cloud_are_refused_with_its_algorithm():
-    with pytest.raises(CloudError, match=r"too far for rails: .* For an airborne cloud, use Track Centerlines"):
-        plausible([source(rail(per_metre=2, length_m=400.0))])
-
-
 def track(spacing_m, width_m, length_m=30.0, density=300, noise_m=0.003, heading=0.6, seed=1):
     """Points on the tops of two railheads, uphill by 2 %, with scattered points on their feet."""
     rng = np.random.default_rng(seed)

@@ -73,15 +73,6 @@ def test_a_fit_says_how_far_the_track_lies_off_in_each_direction(folder, capsys)
     assert [float(one) for one in found.groups()] == pytest.approx([across, height], abs=0.02)
 
 
-def test_a_fit_with_its_own_table_gives_the_same_elements(folder):
-    out = folder / "again.gpkg"
-    fixed = f"{folder / 'out.gpkg'}|layername=elements"
-    assert main(["fit-alignment", str(folder / "tracks.gpkg"), "--fixed", fixed, "--elements", str(out)]) == 0
-    rows, again = table(folder / "out.gpkg", "elements")[0], table(out, "elements")[0]
-    assert again["type"].tolist() == rows["type"].tolist()
-    np.testing.assert_allclose(again["s_from"], rows["s_from"], atol=0.01)
-
-
 def test_a_design_is_read_again_and_compared_with_the_track(folder):
     out = folder / "design.gpkg"
     values = ["--tracks", str(folder / "moved.gpkg"), "--elements", str(out), "--axis", str(out)]
@@ -103,20 +94,6 @@ def points(path, places):
     ]
     crs = {"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::25832"}}
     path.write_text(json.dumps({"type": "FeatureCollection", "crs": crs, "features": features}))
-
-
-@pytest.mark.parametrize("decreasing", [False, True])
-def test_places_have_their_kilometre_along_an_axis(tmp_path, decreasing):
-    written(tmp_path / "axis.gpkg", "axis", [CORNER + [[0, 0, 0], [1000, 0, 0]]], name=["main"])
-    points(tmp_path / "places.json", [(CORNER[:2] + [250, 3]).tolist(), (CORNER[:2] + [900, -4]).tolist()])
-    out = tmp_path / "out.gpkg"
-    values = [str(tmp_path / "places.json"), str(tmp_path / "axis.gpkg"), "--output", str(out), "--start-km", "12.0"]
-    assert main(["station", *values, *(["--direction", "DECREASING"] if decreasing else [])]) == 0
-    rows, shapes = table(out, "places")
-    np.testing.assert_allclose(rows["km"], [11.75, 11.1] if decreasing else [12.25, 12.9], atol=1e-6)
-    np.testing.assert_allclose(rows["offset_m"], [-3, 4] if decreasing else [3, -4], atol=1e-3)
-    assert rows["name"].tolist() == ["0", "1"]
-    np.testing.assert_allclose(shapely.get_coordinates(shapes)[0], CORNER[:2] + [250, 3])
 
 
 def test_an_axis_may_state_kilometres_as_m_values(tmp_path):

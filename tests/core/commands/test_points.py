@@ -8,7 +8,6 @@ import pyproj
 import pytest
 from rail_extract.__main__ import main
 from rail_extract.core.clouds.points import ask
-from rail_extract.core.errors import NoRailPointsError
 from rail_extract.core.pipeline import Parameters, extract_files
 from rail_extract.core.pipeline.sources import Grown, Raw
 from rail_extract.core.run import processes
@@ -69,20 +68,6 @@ def test_workers_change_nothing(save, tmp_path, monkeypatch):
     assert (tmp_path / "1.las").read_bytes() == (tmp_path / "2.las").read_bytes()
 
 
-def test_rails_are_extracted_from_a_raw_cloud(save, tmp_path):
-    request = ask([save(scene()[0])], SEARCHED_CLASSES)
-    parameters = Parameters(1.435, 0.072, passes=1, engine="OPENCV")
-    folder = tmp_path / "work"
-    folder.mkdir()
-    network = extract_files(Raw(request), folder, parameters, Runner())
-    assert [rail.class_code for rail in network.rails] == [10, 10]
-    (track,) = network.centerlines
-    assert track.gauge_mm == pytest.approx(1435, abs=5)  # ten metres of bars without round corners
-    assert not list(folder.iterdir())
-    assert network.search.paired_m == pytest.approx(19, abs=2)
-    assert network.search.squares == 2
-
-
 def test_a_raw_cloud_with_few_points_is_doubted(save, tmp_path):
     xyz, _ = with_track(flat(20.0, rng=np.random.RandomState(3), per_m2=80), 1.435, 0.072, 0.3)
     request = ask([save(rough(xyz, np.random.RandomState(4), 0.01, 0.01))], SEARCHED_CLASSES)
@@ -97,13 +82,6 @@ def test_points_of_a_raw_cloud_that_give_no_rail_are_not_blamed_on_the_classes(s
     assert network.search.points and not network.rails
     assert [warning for warning in network.warnings if "give no rail" in warning and "MIN_LENGTH" in warning]
     assert not [warning for warning in network.warnings if "rail classes" in warning]
-
-
-def test_ground_has_no_rails_to_extract(save, tmp_path):
-    rng = np.random.RandomState(1)
-    request = ask([save(rough(flat(8.0, rng=rng, per_m2=500), rng))], SEARCHED_CLASSES)
-    with pytest.raises(NoRailPointsError, match="No rail was found in the raw cloud: check the rail standard"):
-        extract_files(Raw(request), tmp_path, Parameters(1.435, 0.072, engine="OPENCV"), Runner())
 
 
 def along_track(left=0.0, angle=0.3, length=60.0):

@@ -1,8 +1,11 @@
 """The steps of an extraction as jobs of their own: chained, they give the lines of the whole extraction."""
 
+import re
+
 import numpy as np
 import pytest
 import rail_extract as rx
+from heard import Heard
 from rail_extract.laboratory.scenes.las import write_las
 
 pyogrio, shapely = pytest.importorskip("pyogrio"), pytest.importorskip("shapely")
@@ -81,7 +84,10 @@ def test_chained_steps_give_the_lines_of_an_extraction(cloud, tmp_path):
 
 def test_cleanup_keeps_grid_and_tags_and_says_what_it_did(cloud, tmp_path):
     rx.rasterize(cloud(track()), output=tmp_path / "r.tif")
-    assert rx.clean(tmp_path / "r.tif", output=tmp_path / "c.tif", **HOW).figures["ENGINE_USED"].startswith("OpenCV")
+    heard = Heard()
+    cleaned = rx.clean(tmp_path / "r.tif", output=tmp_path / "c.tif", progress=heard, **HOW)
+    assert cleaned.figures["ENGINE_USED"].startswith("OpenCV") and heard.infos[0].startswith("Network fast, OpenCV ")
+    assert re.fullmatch(r"Class 10: [\d,]+ rail cells before, [\d,]+ after\.", heard.infos[1])
     before, after = source(tmp_path / "r.tif"), source(tmp_path / "c.tif")
     np.testing.assert_array_equal(after.header.frame.origin, before.header.frame.origin)
     for name in ("class_codes", "cell_m", "window", "gauge_m", "head_width_m", "model", "extent"):

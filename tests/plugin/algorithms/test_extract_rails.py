@@ -44,20 +44,6 @@ def lines_of(path):
     return layer, list(layer.getFeatures())
 
 
-def test_rails_and_centerlines_are_written_as_reported(run, scene, outputs):
-    outcome = run({**scene, **outputs})
-    assert outcome.ok, outcome.error
-    for name, figure in (("RAILS", "RAIL"), ("CENTERLINES", "CENTERLINE")):
-        layer, features = lines_of(outputs[name])
-        assert layer.crs().authid() == "EPSG:32643"
-        assert layer.wkbType() == 1002  # LineStringZ
-        assert outcome.results[f"{figure}_COUNT"] == len(features) > 0
-        assert outcome.results[f"{figure}_LENGTH"] == pytest.approx(
-            sum(feature["length_m"] for feature in features), abs=0.01
-        )
-    assert outcome.results["ENGINE_USED"].startswith("PyTorch" if find_spec("torch") else "OpenCV")
-
-
 @pytest.mark.skipif(not find_spec("rasterio"), reason="needs the packages of the cluster")
 def test_the_command_writes_what_qgis_writes(run, run_step, write_cloud, track, tmp_path):
     points = track()
@@ -190,14 +176,6 @@ def test_the_log_names_steps_figures_and_verdict(run, scene, new_feedback, tmp_p
     assert len(feedback.infos) == len(patterns)
     for pattern, said in zip(patterns, feedback.infos):
         assert re.fullmatch(pattern, said), said
-
-
-def test_rail_standard_is_detected(run, write_cloud, track, new_feedback, tmp_path):
-    feedback, rails = new_feedback(), tmp_path / "rails.gpkg"
-    outcome = run({"INPUT": write_cloud(track()), "STANDARD": "DETECT", "ITERATIONS": 1, "RAILS": rails}, feedback)
-    assert outcome.ok, outcome.error
-    assert outcome.results["CENTERLINE_COUNT"] == 1
-    assert "Detected EN 60E1 (UIC 60), 1435 mm (EN_60E1_1435): rails are 1507 mm apart" in feedback.said()
 
 
 @pytest.mark.skipif(not blas(), reason="This numpy has a BLAS that knows one thread only.")

@@ -42,30 +42,6 @@ def measure(run_table):
     return run
 
 
-def test_points_have_the_fields_of_the_interface_and_the_values_of_the_track(measure):
-    middle, left, right = curved_track()
-    results, layer, values = measure(layer_of(middle), layer_of(left, right))
-    assert " ".join(values) == (
-        "track_id chainage_m gauge_mm cant_mm twist_mm radius_m grade_pm sigma_mm points bridged strips strip_mm "
-        "sigmaz_mm"
-    )
-    assert layer.wkbType() == 1001  # PointZ
-    assert layer.crs().authid() == "EPSG:32643"
-    assert results["STATION_COUNT"] == len(values["track_id"]) == 61
-    # The chords are a little shorter than the arc.
-    np.testing.assert_allclose(values["chainage_m"], np.append(np.arange(60), 60), atol=LAST_DIGIT)
-    np.testing.assert_allclose(values["gauge_mm"], SPACING_MM - 72.0, atol=0.2)
-    np.testing.assert_allclose(values["cant_mm"], -CANT_MM, atol=0.01)
-    np.testing.assert_allclose(values["radius_m"], RADIUS_M, rtol=0.002)
-    np.testing.assert_allclose(values["grade_pm"], 4.0, atol=0.01)
-    np.testing.assert_allclose(values["twist_mm"][2:-2], 0.0, atol=0.01)
-    assert np.isnan(values["twist_mm"][[0, 1, -1]]).all()
-    assert not values["bridged"].any()
-    assert results["BRIDGED_LENGTH"] == 0
-    first = next(layer.getFeatures()).geometry().constGet()
-    np.testing.assert_allclose([first.x(), first.y(), first.z()], middle[0], atol=1e-6)
-
-
 def test_without_a_cloud_support_comes_from_the_fields_of_the_rails(measure):
     middle, left, right = curved_track()
     fields = "&field=rail_id:integer&field=class_code:integer&field=points:integer&field=sigma_mm:double"

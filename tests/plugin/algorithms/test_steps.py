@@ -1,13 +1,6 @@
 """The steps of an extraction in QGIS; `tests/core/jobs/test_steps.py` chains them."""
 
-import re
-
-import numpy as np
 import pytest
-from qgis.core import QgsRasterLayer
-from rail_extract.core.files.rail_rasters import RasterSource
-from rail_extract.core.raster import cell_size
-from rail_extract.rail_extract_plugin.reading.rasters import open_with_gdal
 
 
 @pytest.fixture
@@ -21,30 +14,6 @@ def raster(run_step, cloud, tmp_path):
     outcome = run_step("rasterizerailpoints", {"INPUT": cloud, "OUTPUT": tmp_path / "raster.tif"})
     assert outcome.ok, outcome.error
     return tmp_path / "raster.tif"
-
-
-def test_rasterize_alone(raster, track):
-    source = RasterSource(raster, open_with_gdal)
-    header = source.header
-    assert (header.class_codes, header.cell_m) == ((10,), pytest.approx(cell_size(1.435, 0.072)))
-    (found,) = source.read()
-    cells = np.floor((track()[:, :2] - header.frame.origin[:2]) / header.cell_m)
-    # Coordinates in the file are rounded to millimetres, so a point may move to the next cell.
-    assert found.count() == pytest.approx(len(np.unique(cells, axis=0)), rel=0.02)
-    layer = QgsRasterLayer(str(raster), "raster")
-    assert layer.crs().authid() == "EPSG:32643"
-    assert layer.width() * layer.height() == header.window[2] * header.window[3]
-
-
-def test_cleanup_logs_engine_and_cells(run_step, raster, tmp_path, new_feedback):
-    feedback = new_feedback()
-    given = {"INPUT": raster, "ITERATIONS": 1, "ENGINE": "OPENCV", "OUTPUT": tmp_path / "cleaned.tif"}
-    assert run_step("frpdfcleanup", given, feedback).ok
-    engine, cells = feedback.infos
-    assert engine.startswith("Network fast, OpenCV ")
-    before, after = re.fullmatch(r"Class 10: ([\d,]+) rail cells before, ([\d,]+) after\.", cells).groups()
-    before, after = (int(text.replace(",", "")) for text in (before, after))
-    assert 100 < before < 2 * after
 
 
 def test_vectorize_without_points_gives_flat_lines_with_a_warning(run_step, raster, context, new_feedback):
