@@ -19,6 +19,11 @@ SHARP_M = 20.0
 BLUNT_M = 100.0
 """Length of round rails that shows a cloud without these to be blunt; the rest of it need not be seen."""
 
+CLEAR = 5.0
+"""How much longer narrow rails are than round ones in a source that is certainly sharp, and round ones than narrow ones
+in one that is certainly blunt. Passes of one wide beam from the air showed 33 m narrow and 35 m round, and 0 and 110 m;
+a scanner on a train 243 and 0 m, and images of the same rails 0 and 239 m."""
+
 FIRST_PARTS = 4
 """Parts of a cloud that are searched first to find out; then as many again as were searched, until enough rails are
 seen."""
@@ -60,9 +65,9 @@ def blunt_among(seen: Mapping[int, SearchFigures]) -> frozenset[int]:
 
     There are none unless both kinds show enough rails to be certain: a cloud of one kind is left as it is.
     """
-    if not any(figures.sharp_m >= SHARP_M for figures in seen.values()):
+    if not any(figures.sharp_m >= max(SHARP_M, CLEAR * figures.round_m) for figures in seen.values()):
         return frozenset()
-    return frozenset(one for one, figures in seen.items() if is_decided(figures) and is_blunt(figures))
+    return frozenset(one for one, figures in seen.items() if _round_m(figures) >= max(BLUNT_M, CLEAR * figures.sharp_m))
 
 
 def blunt_sources(

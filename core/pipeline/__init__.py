@@ -241,15 +241,11 @@ def _draw_squares(
 
 
 def _blunt_strips(parts: Sequence[SquareRails]) -> frozenset[int]:
-    """Return the strips that are blunt while others of the class are sharp, by most of the length that each shows."""
+    """Return the strips that are blunt while others of the class are sharp, by the lengths that each shows."""
     seen: dict[int, SearchFigures] = {}
     for strip, sharp_m, round_m in np.concatenate([NO_KINDS, *(part.kinds for part in parts)]).tolist():
         seen[int(strip)] = seen.get(int(strip), SearchFigures()) + SearchFigures(sharp_m=sharp_m, round_m=round_m)
-    clear = {
-        strip: replace(one, sharp_m=one.sharp_m - one.round_m, round_m=one.round_m - one.sharp_m)
-        for strip, one in seen.items()
-    }
-    return blunt_among(clear)
+    return blunt_among(seen)
 
 
 def _drawn_alike(

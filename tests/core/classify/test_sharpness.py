@@ -124,6 +124,11 @@ def test_sources_are_blunt_among_sharp_ones_only_if_both_are_certain(sources, bl
     assert len(asked) == searched
 
 
+def test_passes_of_one_wide_beam_are_of_one_kind():
+    """World 263: one pass shows round rails only, the others both kinds."""
+    assert not blunt_among({3: SearchFigures(round_m=110.5), 5: SearchFigures(sharp_m=33.0, round_m=34.6)})
+
+
 def test_a_source_that_shows_little_is_not_called_blunt():
     figures = {1: SearchFigures(sharp_m=500.0), 2: SearchFigures(round_m=99.0), 3: SearchFigures(round_m=101.0)}
     assert blunt_among(figures) == {3}
