@@ -162,7 +162,7 @@ SWITCHES = (
     _rule("airborne.fitting.RIVAL_SHARE", np.inf),
     _rule("airborne.fitting.REPEATED_SHARE", np.inf),
     _rule("airborne.fitting.ASIDE_M", np.inf),
-    _rule("airborne.fitting.TWIN_M", 0.0),
+    _rule("airborne.fitting.APART_M", 0.0),
     _rule("airborne.fitting.TOE_FACTOR", 1.0),
     _rule("airborne.fitting.SHARED", 1.0),
     _rule("airborne.fitting.FOOTPRINT_SHARE", 0.0),

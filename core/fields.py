@@ -276,6 +276,119 @@ AXIS_FIELDS = (
 """Alignments as lines whose M values are kilometres."""
 
 
+INTRUSION_FIELDS = (
+    Field("intrusion", int, "number of the object, from 1 for the deepest sure one; what is allowed there comes last"),
+    Field("track_id", int, "number of the track whose profile is entered"),
+    Field("from_m", float, "chainage at which the object begins inside, metres", 2),
+    Field("to_m", float, "chainage at which it ends, metres", 2),
+    Field("chainage_m", float, "chainage of the worst place, metres", 2),
+    Field("side", str, "left or right, seen along the line"),
+    Field("v_mm", float, "worst place: to the left in the plane of the rail tops, millimetres", 1),
+    Field("w_mm", float, "worst place: above this plane, millimetres", 1),
+    Field("wmin_mm", float, "lowest point inside, above the plane of the rail tops, millimetres", 0),
+    Field("wmax_mm", float, "highest point inside, millimetres", 0),
+    Field("pen_mm", float, "penetration of the surface, margin and widening included, millimetres", 1),
+    Field("raw_mm", float, "penetration of the deepest point, noise included, millimetres", 1),
+    Field("sigma_mm", float, "standard error of pen_mm, millimetres; not that of the strips against each other", 1),
+    Field("sure", int, "1 where pen_mm exceeds two standard errors, else 0"),
+    Field("points", int, "points inside"),
+    CLASS_CODE,
+    Field("what", str, "vehicle on track N, platform or contact wire, which do not count; else empty"),
+    Field("km", float, "kilometre of the worst place; empty without an axis", 6),
+    Field("km_text", str, "the kilometre as railways write it"),
+    Field("review", str, "decision of the user: accepted or rejected; empty before"),
+)
+BAND_NAMES = (
+    "from the lowest height to 380 mm",
+    "380 to 1170 mm",
+    "1170 to 3250 mm",
+    "3250 to 4310 mm",
+    "4310 to 7000 mm",
+)
+"""Height bands of the stations of the clearance, over the rail tops."""
+
+SIDES = (("l", "left"), ("r", "right"))
+CLEARANCE_FIELDS = (
+    Field("track_id", int, "number of the track"),
+    Field("chainage_m", float, "plan distance from the start of the centerline, metres", 2),
+    Field("cant_mm", float, "cant used: left rail minus right rail, millimetres", 1),
+    Field("radius_m", float, "radius over 15 m, positive in left-hand curves, empty above 10 km, metres", 1),
+    *(Field(f"wide_{one}_mm", float, f"widening used on the {side}, millimetres", 1) for one, side in SIDES),
+    *(
+        Field(f"{one}mar_mm", float, f"least margin on the {side}, millimetres; negative inside", 1)
+        for one, side in SIDES
+    ),
+    *(
+        Field(f"{one}{band}_mm", float, f"{side}: distance of the third nearest point, {name}, millimetres", 1)
+        for one, side in SIDES
+        for band, name in enumerate(BAND_NAMES, start=1)
+    ),
+    *(
+        Field(f"{one}{band}m_mm", float, f"{side}: margin of the third nearest point, {name}, millimetres", 1)
+        for one, side in SIDES
+        for band, name in enumerate(BAND_NAMES, start=1)
+    ),
+    *(
+        field
+        for one, side in SIDES
+        for field in (
+            Field(f"{one}dist_m", float, f"distance of the track on the {side}, metres", 4),
+            Field(f"{one}track", int, f"number of the track on the {side}"),
+            Field(f"{one}dz_mm", float, f"height of the track on the {side} above this one, millimetres", 1),
+        )
+    ),
+    *(
+        field
+        for one, side in SIDES
+        for field in (
+            Field(f"{one}off_mm", float, f"distance of the platform edge on the {side}, millimetres", 1),
+            Field(f"{one}hgt_mm", float, f"height of the platform edge on the {side}, millimetres", 1),
+        )
+    ),
+    Field("wire_mm", float, "height of the contact wire over the rail tops, millimetres", 1),
+    Field("stagger_mm", float, "stagger of the contact wire, positive to the left, millimetres", 1),
+    Field("points", int, "points within reach"),
+    Field("bridged", int, "1 where a rail has no points, or is missing, so that the cant is interpolated; else 0"),
+    Field("km", float, "kilometre; empty without an axis", 6),
+    Field("km_text", str, "the kilometre as railways write it"),
+)
+PLATFORM_FIELDS = (
+    Field("platform", int, "number of the platform edge"),
+    Field("track_id", int, "number of the track"),
+    Field("side", str, "left or right, seen along the line"),
+    Field("from_m", float, "chainage at which the edge begins, metres", 1),
+    Field("to_m", float, "chainage at which it ends, metres", 1),
+    Field("length_m", float, "length along the track, metres", 1),
+    Field(
+        "offset_mm", float, "mean distance from the middle of the track in the plane of the rail tops, millimetres", 1
+    ),
+    Field("offmin_mm", float, "least distance, millimetres", 1),
+    Field("offmax_mm", float, "largest distance, millimetres", 1),
+    Field("height_mm", float, "mean height over the plane of the rail tops, millimetres", 1),
+    Field("hmin_mm", float, "least height, millimetres", 1),
+    Field("hmax_mm", float, "largest height, millimetres", 1),
+    Field("nominal_mm", int, "nominal height, 550 or 760, if one is within 60 mm"),
+    Field("sigma_mm", float, "standard error of the distance at a place, millimetres", 1),
+    Field("sigmaz_mm", float, "standard error of the height at a place, millimetres", 1),
+    *EXTENT_FIELDS,
+)
+WIRE_FIELDS = (
+    Field("wire", int, "number of the contact wire"),
+    Field("track_id", int, "number of the track"),
+    Field("from_m", float, "chainage at which the wire begins, metres", 1),
+    Field("to_m", float, "chainage at which it ends, metres", 1),
+    Field("length_m", float, "length along the track, metres", 1),
+    Field("height_mm", float, "mean height over the plane of the rail tops, millimetres", 1),
+    Field("hmin_mm", float, "least height, millimetres", 1),
+    Field("hmax_mm", float, "largest height, millimetres", 1),
+    Field("stagmin_mm", float, "least stagger, positive to the left, millimetres", 1),
+    Field("stagmax_mm", float, "largest stagger, millimetres", 1),
+    Field("grade_pm", float, "steepest gradient against the track over 20 m, per mille", 2),
+    Field("sigma_mm", float, "standard error at a place, millimetres", 1),
+    *EXTENT_FIELDS,
+)
+
+
 @dataclass(frozen=True)
 class Product:
     """A kind of layer, with lines as features, or else points.
@@ -313,11 +426,15 @@ DIFFERENCES = Product("differences", DIFFERENCE_FIELDS, "DIFFERENCES", is_line=F
 ELEMENTS = Product("elements", ELEMENT_FIELDS, "ELEMENTS")
 AXES = Product("axes", AXIS_FIELDS, "ALIGNMENT", layer="axis")
 DEVIATIONS = Product("deviations", DEVIATION_FIELDS, "DEVIATIONS", is_line=False)
+INTRUSIONS = Product("intrusions", INTRUSION_FIELDS, "INTRUSIONS", is_line=False)
+CLEARANCE = Product("clearance", CLEARANCE_FIELDS, "CLEARANCE", is_line=False)
+PLATFORMS = Product("platforms", PLATFORM_FIELDS, "PLATFORMS")
+WIRES = Product("wires", WIRE_FIELDS, "WIRES")
 PLACES = Product("places", (*STATION_FIELDS, *EXTENT_FIELDS), "PLACES")
 """The fields that copies of layers of any kind get in addition; their style only names these."""
 
 PRODUCTS = (
     *(RAILS, CENTERLINES, QUALITY, LOCATED_QUALITY, FINDINGS, LOCATED_FINDINGS, STOPS, AIRBORNE, STATIONS),
-    *(DIFFERENCES, ELEMENTS, AXES, DEVIATIONS, PLACES),
+    *(DIFFERENCES, ELEMENTS, AXES, DEVIATIONS, INTRUSIONS, CLEARANCE, PLATFORMS, WIRES, PLACES),
 )
 """Every kind of layer that a run can write."""

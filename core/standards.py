@@ -35,6 +35,9 @@ GAUGE_RANGE_MM = (500.0, 2000.0)
 HEAD_WIDTH_RANGE_MM = (40.0, 90.0)
 """From the lightest mine rails to above the widest head in tables (77.79 mm, 141RE); crane rails are wider."""
 
+SPACING_RANGE_M = tuple((gauge + head) / 1000 for gauge, head in zip(GAUGE_RANGE_MM, HEAD_WIDTH_RANGE_MM))
+"""Range of the distances between the axes of a track's rails."""
+
 
 @dataclass(frozen=True)
 class RailStandard:

@@ -17,7 +17,7 @@ FOLDER = "resources/guide"
 
 PAGES = (
     *("README", "tutorial", "parameters", "reference", "limits", "troubleshooting", "faults", "accuracy", "scaling"),
-    *("stationing", "comparison", "alignment", "alignment_tutorial", "alignment_files", "airborne"),
+    *("stationing", "comparison", "alignment", "alignment_tutorial", "alignment_files", "airborne", "clearance"),
 )
 """Pages for users; the other pages of the folder are for developers."""
 

@@ -23,15 +23,19 @@ from rail_extract.core.fields import (  # noqa: E402
     AIRBORNE,
     AXES,
     CENTERLINES,
+    CLEARANCE,
     DEVIATIONS,
     DIFFERENCES,
     ELEMENTS,
     FINDINGS,
+    INTRUSIONS,
     PLACES,
+    PLATFORMS,
     QUALITY,
     RAILS,
     STATIONS,
     STOPS,
+    WIRES,
     Field,  # noqa: E402
 )
 from rail_extract.core.jobs.declaration import UNBOUNDED  # noqa: E402
@@ -61,6 +65,10 @@ LAYERS = {
     "Elements": ELEMENTS,
     "Deviations": DEVIATIONS,
     "Axes": AXES,
+    "Intrusions": INTRUSIONS,
+    "Clearance": CLEARANCE,
+    "Platforms": PLATFORMS,
+    "Contact wires": WIRES,
 }
 
 

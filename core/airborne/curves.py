@@ -12,27 +12,23 @@ import numpy as np
 from scipy.sparse import block_diag, csr_matrix, diags, vstack
 
 from ..polyline import Polyline, cross
-from .ridges import OUTLIER, STATION_M, Sections
+from .guide_line import STATION_M
+from .ridges import OUTLIER, Sections
 from .search import parallel
 
 LITTLE = 1e-12
 """Added to the diagonal, so that a matrix without any data can be solved."""
 
-STRAIGHT_M = 0.004
-"""Standard deviation of the third differences of a track in plan, over 10 m, where its curvature does not change."""
+STILL_M = 0.004
+"""Standard deviation, over 10 m, of the third differences of a track in plan where its curvature does not change, and
+of the second differences of the distance between two tracks: it changes by as much in a curve of 300 m radius."""
 
 STRAIGHT_SECTIONS = 2
-"""Sections for which `STRAIGHT_M` counts beside what is measured."""
+"""Sections for which `STILL_M` counts for a track beside what is measured."""
 
 TURN_SECTIONS = 5
-"""Sections over which the third differences are measured: a transition is rarely shorter than 50 m."""
-
-APART_M = 0.004
-"""Standard deviation of the second differences, over 10 m, of the distance between two tracks: it changes by as much in
-a curve of 300 m radius."""
-
-APART_SECTIONS = 5
-"""Sections for which `APART_M` counts beside what is measured."""
+"""Sections over which the differences are measured, for which `STILL_M` counts for a distance, and up to which
+residuals do not judge the standard errors: a transition is rarely shorter than 50 m."""
 
 FIRST_TURN_M, FIRST_APART_M = 0.03, 0.3
 """Standard deviations with which the search for both begins: a curve of 300 m radius whose transition is 60 m long has
@@ -46,9 +42,6 @@ TRUSTED = 0.2
 
 HOLD_M = 0.3
 """Standard error of the place of a section that is not seen: it stays where the last curve passed."""
-
-FEW_SECTIONS = 5
-"""Sections up to which residuals do not judge the standard errors."""
 
 SPREAD = (0.5, 3.0)
 """Limits of the factor by which residuals correct the standard errors."""
@@ -147,7 +140,7 @@ def draw_together(lines: Sequence[Polyline], found: Sequence[Sections]) -> list[
 
 def _spread(residual: np.ndarray) -> float:
     """Return how much larger than their standard errors residuals are."""
-    return float(np.clip(np.sqrt(np.mean(residual**2)), *SPREAD)) if len(residual) > FEW_SECTIONS else 1.0
+    return float(np.clip(np.sqrt(np.mean(residual**2)), *SPREAD)) if len(residual) > TURN_SECTIONS else 1.0
 
 
 @dataclass(frozen=True)
@@ -167,8 +160,8 @@ class _Stiffness:
         """Set up the differences at the stations of lines."""
         own = [differences(len(t), 3) for t in stations]
         apart = list(_distances(lines, stations))
-        blocks = [(one.shape[0], STRAIGHT_M, STRAIGHT_SECTIONS) for one in own]
-        blocks += [(one.shape[0], APART_M, APART_SECTIONS) for one in apart]
+        blocks = [(one.shape[0], STILL_M, STRAIGHT_SECTIONS) for one in own]
+        blocks += [(one.shape[0], STILL_M, TURN_SECTIONS) for one in apart]
         starts = [FIRST_TURN_M] * len(own) + [FIRST_APART_M] * len(apart)
         first = np.concatenate([np.full(count, start) for (count, _, _), start in zip(blocks, starts)])
         return cls(vstack([block_diag(own), *apart], format="csr"), first, blocks)

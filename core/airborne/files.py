@@ -21,14 +21,15 @@ from ..frame import LocalFrame
 from ..parameters import AirborneParameters
 from ..polyline import Polyline
 from ..progress import SILENT, Progress
+from ..raster import ROW
 from ..run.loop import Runner
 from ..run.tasks import READ_S, Context, Task
 from ..standards import STANDARDS
 from ..tiles.grid import Key
 from ..tiles.store import SortedFile, append, counts_of, files_of, read_stored
 from .fitting import EMPTY, SEEN, Fitted, TrackStations, fit_tracks
-from .guide_line import axis_of_guide
-from .ridges import HALF_M, STATION_M
+from .guide_line import STATION_M, axis_of_guide
+from .ridges import HALF_M
 from .rounds import WIDE_M
 from .survey import (
     FLIGHT,
@@ -56,9 +57,6 @@ CELL_M = 16.0
 
 AREA_M = 200.0
 """Length of guide in a rectangle in which points are read."""
-
-ROW = 2**31
-"""Cells in a row, so that one number stands for a cell."""
 
 POINT = np.dtype([("xyz", "<f8", 3), ("mark", "<u4")])
 """A point on disk: metres from the zero of the coordinate system, and its mark, see `passes.marks_of`."""

@@ -10,10 +10,21 @@ from scipy.spatial import cKDTree
 
 from ..polyline import Polyline
 from ..progress import SILENT, Progress
-from .guide_line import SECTION_M, GuidePoints, gather
-from .ridges import EDGE_M, HALF_M, STATION_M, RidgeShape
-from .rounds import LONG, REACHES_M, TRACKS_APART_M, WIDE_M, Beside, Refined, Traced, look_beside, refine, strip_error
-from .search import Evidence, GuideCourse, certainty, courses, evidence, groups, slopes
+from .guide_line import SECTION_M, STATION_M, GuidePoints, gather
+from .ridges import BIN_M, HALF_M, RidgeShape
+from .rounds import REACHES_M, REPEATED_M, WIDE_M, Beside, Refined, Traced, look_beside, refine, strip_error
+from .search import (
+    APART_M,
+    LONG,
+    TRACKS_APART_M,
+    Evidence,
+    GuideCourse,
+    certainty,
+    courses,
+    evidence,
+    groups,
+    slopes,
+)
 
 LONG_GAIN = 7.0
 """Gain that two rails must have over 70 m: roads, hedges and ditches stay below."""
@@ -35,9 +46,6 @@ SURE = 0.9
 
 MARGIN = 3.0
 """Least score of the course above that of one elsewhere."""
-
-TWIN_M = 0.4
-"""Two results this close, where their guides are `TRACKS_APART_M` apart, are one track with two guides."""
 
 SWITCH_M, TOE_M, TOE_FACTOR = 3.0, 0.5, 2.0
 """Two results this close are those of a switch; this close, both pull each other, and the standard error grows by this
@@ -179,7 +187,7 @@ def _judged(axes: Sequence[Polyline], lines: dict[int, _Line], footprint_m: floa
         sigma = toe * np.sqrt((SHARED * refined.curve.sigma) ** 2 + blur**2 + strip_error(refined) ** 2)
         reason = _reasons(line, distance < SWITCH_M)
         reason[(reason == SEEN) & (sigma > toe * MAX_SIGMA_M)] = SPARSE
-        reason[(reason == SEEN) & (distance < TWIN_M) & (apart > TRACKS_APART_M)] = TWIN
+        reason[(reason == SEEN) & (distance < APART_M) & (apart > TRACKS_APART_M)] = TWIN
         stations = TrackStations(
             refined.t,
             refined.curve.xy,
@@ -211,7 +219,7 @@ def _reasons(line: _Line, switch: np.ndarray) -> np.ndarray:
     refined, sections = line.refined, line.refined.seen.sections
     most = sections.found.most
     own = sections.found.both > np.minimum(OWN_GAIN, most - CHANCE * np.sqrt(2 * most))
-    own &= np.abs(sections.offset) < REACHES_M[-1] - EDGE_M
+    own &= np.abs(sections.offset) < REACHES_M[-1] - BIN_M
     shown, flat = _over_70_m(line.beside, switch) if line.beside is not None else (own, own)
     half = np.minimum(np.arange(len(own)) * 2, len(line.sure) - 1)
     reason = np.full(len(own), SEEN)
@@ -277,10 +285,6 @@ def _places(lines: Iterable[_Line]) -> cKDTree:
     return cKDTree(np.concatenate([Polyline(line.refined.curve.xy).resampled(VERTEX_M).xy for line in lines]))
 
 
-OTHER_GAIN, CLAIMED_M = 10.0, 1.2
-"""A place beside a track looks like another one with this gain over 70 m; it has a guide if a line is this close."""
-
-
 def _unclaimed(number: int, lines: dict[int, _Line]) -> np.ndarray:
     """Return chainages and distances of places beside a line that look like tracks without a guide, (k, 2)."""
     line = lines[number]
@@ -296,7 +300,7 @@ def _unclaimed(number: int, lines: dict[int, _Line]) -> np.ndarray:
             best = int(there.argmax())
             at, across = np.array([t]), line.beside.across[best]
             place = line.refined.line.at(at) + across * line.refined.line.left_at(at)
-            free = known.query(place)[0][0] > CLAIMED_M
-            if min(own, there[best]) > OTHER_GAIN and free:
+            free = known.query(place)[0][0] > REPEATED_M
+            if min(own, there[best]) > LONG_GAIN and free:
                 found.append((t, float(across)))
     return np.array(found).reshape(-1, 2)

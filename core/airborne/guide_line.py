@@ -24,6 +24,9 @@ SMOOTHED_M = 4.0
 SECTION_M = 5.0
 """Length over which the level of the bed is taken."""
 
+STATION_M = 2 * SECTION_M
+"""Length of a section of the fit, and the distance of stations."""
+
 BED_M, BED_SHARE = 2.5, 0.4
 """Distance from the axis within which points state the level of the bed, and their quantile: the bed is the larger
 part of what lies there, and rails and plants are above it."""
@@ -34,8 +37,8 @@ LEVEL_JUMP_M, MEDIAN_SECTIONS = 0.4, 9
 BELOW_M, ABOVE_M = 1.6, 1.1
 """Heights about the level outside of which points tell nothing about the track: wires, roofs, slopes."""
 
-CELL_M, CELL_ACROSS_M, TRIM_M = 10.0, 0.25, 0.25
-"""Cells, along and across, from whose median no point lies farther: rails stand less above their bed."""
+CELL_ACROSS_M, TRIM_M = 0.25, 0.25
+"""Width of the cells, `STATION_M` long, from whose median no point lies farther: rails stand less above their bed."""
 
 OWN_LEVEL_M, MIN_SHARED = 2.0, 5
 """Distance from the axis within which strips are compared, and the number of sections that must show both."""
@@ -188,7 +191,7 @@ def _level(section: np.ndarray, across: np.ndarray, z: np.ndarray, count: int) -
 
 def _near_the_median(corridor: Corridor) -> np.ndarray:
     """Return which points lie near the median of their cell, (n,) bool."""
-    row = corridor.section_of(CELL_M)
+    row = corridor.section_of(STATION_M)
     column = np.floor(corridor.across / CELL_ACROSS_M).astype(np.int64)
     cell = (row - row.min(initial=0)) * 4096 + column + 2048
     order = np.lexsort((corridor.height, cell))

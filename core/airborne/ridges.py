@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..polyline import Polyline
-from .guide_line import Corridor
+from .guide_line import STATION_M, Corridor
 
 HALF_M = 1.25
 """Half the width of the bed that is looked at: a platform may begin 0.25 m farther out."""
@@ -48,19 +48,17 @@ FLAT_LOSS = 0.45
 UNSEEN_VARIANCE = 1e9
 """Variance of a bin without points."""
 
-STATION_M = 10.0
-"""Length of a section of the fit, and the distance of stations."""
-
 BIN_M, PROFILE_BIN_M = 0.025, 0.02
-"""Width of the bins across in the fit of a section, and in the profile of a whole line."""
+"""Width of the bins across in the fit of a section, and in the profile of a whole line. A middle that lies within a bin
+of the end of the search lies beyond it."""
 
 WIDTHS_M = np.arange(0.04, 0.24, 0.01)
 SPACINGS_M = np.arange(-0.12, 0.121, 0.02)
 """Widths of a ridge that are tried, and deviations of the rails' distance, up to those between neighbouring gauges."""
 
-OTHER_GAIN, OTHER_SHARE, OTHER_M = 40.0, 0.1, 0.045
-"""Log-likelihood of another distance of the rails above that of the expected one, also as a share of its own, and the
-deviation, from which it is said: ballast piled at the rails shifts the ridges by up to 20 mm."""
+OTHER_GAIN, OTHER_M = 40.0, 0.045
+"""Log-likelihood of another distance of the rails above that of the expected one, and the deviation, from which it is
+said: ballast piled at the rails shifts the ridges by up to 20 mm."""
 
 PROFILE_ROUGH_M, FREE = 0.004, 3.0
 """Roughness of a profile, and the spread of the ridge's height while it is measured."""
@@ -79,9 +77,6 @@ LEAST_SIGMA_M = 0.004
 
 ENOUGH_GAIN = 6.0
 """A section shows a track if three of them gain more than this."""
-
-EDGE_M = 0.01
-"""A middle this close to the end of the search lies beyond it."""
 
 
 @dataclass(frozen=True)
@@ -312,7 +307,7 @@ def _other_spacing(count: np.ndarray, mean: np.ndarray, u: np.ndarray, shape: Ri
         float(fit(count, mean, u, replace(shape, spacing_m=shape.spacing_m + more)).both[0]) for more in SPACINGS_M
     ]
     best, expected = int(np.argmax(gains)), gains[len(gains) // 2]
-    clearly = gains[best] - expected > max(OTHER_GAIN, OTHER_SHARE * gains[best])
+    clearly = gains[best] - expected > OTHER_GAIN
     return float(shape.spacing_m + SPACINGS_M[best]) if clearly and abs(SPACINGS_M[best]) > OTHER_M else np.nan
 
 
@@ -336,7 +331,7 @@ def fit_sections(corridor: Corridor, shape: RidgeShape, reach_m: float, length_m
         *(getattr(found, name)[rows, at] for name in ("gain", "both", "flaw", "most", "height", "level", "tilt"))
     )
     together = np.convolve(here.both, np.ones(3))[1:-1]
-    shows = (together > ENOUGH_GAIN) & (here.both > 0) & (np.abs(offset) < reach_m - EDGE_M)
+    shows = (together > ENOUGH_GAIN) & (here.both > 0) & (np.abs(offset) < reach_m - BIN_M)
     return Sections(offset, np.maximum(1 / np.sqrt(sharp), LEAST_SIGMA_M), here, points, shows)
 
 

@@ -12,13 +12,12 @@ import numpy as np
 
 from ..polyline import Polyline
 from .curves import FIRST_TURN_M, TrackCurve, differences, draw_together, smooth
+from .guide_line import SECTION_M, STATION_M, Corridor, GuidePoints, gather
 from .guide_line import STEP_M as VERTEX_M
-from .guide_line import Corridor, GuidePoints, gather
 from .ridges import (
     ENOUGH_GAIN,
     HALF_M,
     LEAST_SIGMA_M,
-    STATION_M,
     RidgeShape,
     Sections,
     binned,
@@ -27,17 +26,13 @@ from .ridges import (
     measure,
     windows,
 )
-from .search import STEP_M
-
-LONG = 7
-"""Sections that are looked at as one: one section may be hidden, or mislead."""
+from .search import APART_M, LONG, STEP_M, TRACKS_APART_M
 
 WIDE_M = 5.6
 """Distance from the line up to which places are compared: tracks of one line are rarely farther apart."""
 
-APART_M, REPEATED_M, TRACKS_APART_M = 0.4, 1.1, 2.8
-"""Places this far apart are others, those less far apart than a gauge have no rail of the line, and two tracks are at
-least this far apart."""
+REPEATED_M = 1.1
+"""Places less far apart than a gauge are of one track, and rails of the line are on its own place alone."""
 
 REACHES_M = (0.45, 0.35, 0.25)
 """Distance from the line within which its middle is looked for, in each round."""
@@ -192,7 +187,7 @@ def refine(tracks: Sequence[Traced]) -> list[Refined | None]:
 
 def _first(track: Traced) -> Polyline:
     """Return the line through the course of a track."""
-    middles = float(track.guide.t[0]) + (np.arange(len(track.across)) + 0.5) * (STATION_M / 2)
+    middles = float(track.guide.t[0]) + (np.arange(len(track.across)) + 0.5) * SECTION_M
     place, normal = track.guide.at(middles), track.guide.left_at(middles)
     weight, rows = np.full(len(place), COURSE_M**-2), differences(len(place), 3)
     curve = smooth(place + track.across[:, None] * normal, weight, rows, FIRST_TURN_M)

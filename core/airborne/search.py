@@ -34,28 +34,29 @@ STEP_COST, TURN_COST = 0.5, 1.0
 GUIDE_M, GUIDE_LENGTH_M = 1.2, 20.0
 """Standard deviation of a guide, and the length over which its error is a new one."""
 
-APART_M = 0.5
-"""Distance beyond which another place is a different answer."""
+APART_M, TRACKS_APART_M = 0.4, 2.8
+"""Places this far apart are others, and two tracks are at least this far apart."""
 
 IMPOSSIBLE = -1e9
 """Score of a place where no course runs: below every sum of scores."""
 
-FAR_M, NEAR_M, PARALLEL = 13.0, 2.5, 0.995
-"""Guides this far apart at most, and this far at least, are those of one line where the cosine of their angle is
-larger."""
+FAR_M, PARALLEL = 13.0, 0.995
+"""Guides this far apart at most are those of one line where the cosine of their angle is larger."""
+
+LONG = 7
+"""Sections that are looked at as one: one section may be hidden, or mislead."""
 
 OWN_M = 0.5
 """Standard deviation of a guide's own error beside that of its line."""
 
-OWN_LENGTH_M, SMOOTHED_SECTIONS = 50.0, 7
-"""Length over which this error is a new one, and the sections over which the joint course is averaged."""
+OWN_LENGTH_M = 50.0
+"""Length over which this error is a new one."""
 
 MOST_TOGETHER = 8
 """Tracks whose curves are drawn together: the run time grows with the third power of their number."""
 
-RIVAL_SHARE, RIVAL_SECTIONS, SAME_M = 0.8, 9, 0.2
-"""Another track is at least `NEAR_M` away and has this share of the score over as many sections; places this close are
-the same."""
+RIVAL_SHARE, RIVAL_SECTIONS = 0.8, 9
+"""Another track has this share of the score over as many sections."""
 
 
 @dataclass(frozen=True)
@@ -176,8 +177,8 @@ def courses(axes: Sequence[Polyline], found: Sequence[Evidence]) -> tuple[list[G
     for one, score in zip(found, together):
         shared = Evidence(one.across, one.score + (score - one.best)[:, None, :])
         course = trace(shared, guide_prior(one.across, len(score)))
-        padded = np.pad(course.across, SMOOTHED_SECTIONS // 2, mode="edge")
-        middle = np.convolve(padded, np.ones(SMOOTHED_SECTIONS) / SMOOTHED_SECTIONS, "valid")
+        padded = np.pad(course.across, LONG // 2, mode="edge")
+        middle = np.convolve(padded, np.ones(LONG) / LONG, "valid")
         prior = -0.5 * ((one.across - middle[:, None]) / OWN_M) ** 2 * SECTION_M / OWN_LENGTH_M
         joined.append(trace(one, prior))
     return joined, together
@@ -222,7 +223,7 @@ def parallel(place: np.ndarray, normal: np.ndarray, other: Polyline) -> tuple[np
     near = np.isfinite(distance)
     nearest = np.where(near, nearest, 0)
     cosine = (normal * other.normals[nearest]).sum(axis=1)
-    near &= (np.abs(cosine) > PARALLEL) & (distance > NEAR_M)
+    near &= (np.abs(cosine) > PARALLEL) & (distance > TRACKS_APART_M)
     return near, other.t[nearest], cosine < 0
 
 
@@ -242,7 +243,7 @@ def certainty(course: GuideCourse, score: np.ndarray, across: np.ndarray) -> np.
     kernel = np.ones(min(RIVAL_SECTIONS, len(score)))
     mean = np.column_stack([np.convolve(one, kernel / len(kernel), "same") for one in score.T])
     apart = np.abs(across - course.across[:, None])
-    own = np.where(apart < SAME_M, mean, 0.1).max(axis=1)
-    rival = (apart > NEAR_M) & (mean > RIVAL_SHARE * own[:, None])
+    own = np.where(apart < APART_M, mean, 0.1).max(axis=1)
+    rival = (apart > TRACKS_APART_M) & (mean > RIVAL_SHARE * own[:, None])
     nearest = np.where(rival, np.abs(across), np.inf).min(axis=1)
     return 1 / (1 + np.exp(-(np.minimum(nearest, 10.0) ** 2 - course.across**2) / (2 * GUIDE_M**2)))

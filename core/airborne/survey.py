@@ -14,7 +14,8 @@ from ..parameters import AirborneParameters
 from ..polyline import length_along
 from ..standards import GAUGE_RANGE_MM, STANDARDS
 from .fitting import BED_SIGMA_M, REASONS, SEEN, Fitted, TrackStations
-from .ridges import STATION_M, RidgeShape
+from .guide_line import STATION_M
+from .ridges import OTHER_M, RidgeShape
 
 MAX_UNSEEN_M, LEAST_STATIONS = 30.0, 3
 """A line ends where its track is not seen for longer, and is none with fewer stations that are."""
@@ -45,9 +46,6 @@ FLIGHT = (
 
 WIDE_RIDGES = 1.6
 """Ridges this much wider than the footprint makes them are warned of."""
-
-KNOWN_M = 0.045
-"""A gauge that the points show means the nearest one of a rail standard, if it is this close."""
 
 FEW_GUIDES = 5
 """A sentence names no more guides than this."""
@@ -379,7 +377,7 @@ def on_gauges(
 def _nearest_gauge(gauge_m: float) -> int:
     """Return the gauge of a rail standard next to a measured one, millimetres, or this one rounded."""
     known_m = min((one.gauge_m for one in STANDARDS.values()), key=lambda one: abs(one - gauge_m))
-    return round(1000 * known_m) if abs(known_m - gauge_m) < KNOWN_M else 10 * round(100 * gauge_m)
+    return round(1000 * known_m) if abs(known_m - gauge_m) < OTHER_M else 10 * round(100 * gauge_m)
 
 
 def _guides(ids: Sequence[int]) -> str:

@@ -17,7 +17,8 @@ from ..errors import CloudError
 from ..polyline import project, runs
 from ..progress import SILENT, Progress
 from ..rails import RailLine
-from ..standards import GAUGE_RANGE_MM, HEAD_WIDTH_RANGE_MM
+from ..raster import ROW
+from ..standards import SPACING_RANGE_M
 from ..tiles.grid import PointSource, Square, around, lay_out
 
 WINDOW_M, MIN_IN_WINDOW = 4.0, 10
@@ -56,9 +57,6 @@ AIRBORNE_SPACING_M, AIRBORNE_PER_METRE = 1.0, 12.0
 """Distance of points on rails below which a thin class may be that of an airborne cloud, and points per metre of rail
 below which rails that were drawn are those of one: 40 points per square metre give nine."""
 
-_ROW = 1 << 32
-"""Distance between the numbers of two rows of cells."""
-
 PLACES = 300
 """Number of places where the rails are looked at."""
 
@@ -83,10 +81,6 @@ TOP_M = 0.030
 
 TOP_PERCENT = 95
 """Percentile of the heights that stands for the top."""
-
-MIN_SPACING_M = (GAUGE_RANGE_MM[0] + HEAD_WIDTH_RANGE_MM[0]) / 1000
-MAX_SPACING_M = (GAUGE_RANGE_MM[1] + HEAD_WIDTH_RANGE_MM[1]) / 1000
-"""Range of the distances between the axes of a track's rails."""
 
 BIN_M, HALF_PEAK_M = 0.005, 0.015
 """Bin of the histogram of distances, and half the width of its peak: most track is within 15 mm of its gauge."""
@@ -203,11 +197,11 @@ def _company(xyz: np.ndarray, side_m: float, rings: int) -> tuple[np.ndarray, np
     Returns the number of the cell of each point, (n,), and the points in each cell and its rings, (m,).
     """
     columns, rows = np.floor(xyz[:, :2] / side_m).astype(np.int64).T
-    cells, number, counts = np.unique(rows * _ROW + columns, return_inverse=True, return_counts=True)
+    cells, number, counts = np.unique(rows * ROW + columns, return_inverse=True, return_counts=True)
     company = np.zeros(len(cells), dtype=np.int64)
     for down in range(-rings, rings + 1):
         for right in range(-rings, rings + 1):
-            other = cells + down * _ROW + right
+            other = cells + down * ROW + right
             place = np.minimum(np.searchsorted(cells, other), len(cells) - 1)
             company += np.where(cells[place] == other, counts[place], 0)
     return number.ravel(), company
@@ -265,7 +259,7 @@ def measure_spacings(xyz: np.ndarray) -> Spacings:
 
 def _near(tree: cKDTree, place: np.ndarray) -> list[int]:
     """Return the points that may be on the rail of a place or on its partner, or an even selection of them."""
-    near = tree.query_ball_point(place[:2], np.hypot(MAX_SPACING_M + REACH_M, HALF_LENGTH_M))
+    near = tree.query_ball_point(place[:2], np.hypot(SPACING_RANGE_M[1] + REACH_M, HALF_LENGTH_M))
     return near[:: -(-len(near) // MAX_NEAR) or 1]
 
 
@@ -287,7 +281,7 @@ def _spacings(near: np.ndarray) -> Iterator[tuple[float, float]]:
     if len(own) != 1:
         return
     for axis, _ in heads:
-        if MIN_SPACING_M <= abs(axis - own[0][0]) <= MAX_SPACING_M:
+        if SPACING_RANGE_M[0] <= abs(axis - own[0][0]) <= SPACING_RANGE_M[1]:
             yield abs(axis - own[0][0]), own[0][1]
 
 

@@ -54,7 +54,9 @@ class FileValues(Values):
         for one in job.outputs:
             if named[one.name] is not None:
                 check_packages(one)
-        self.destinations = destinations_of(job, {name: Path(file) for name, file in named.items() if file is not None})
+        self.destinations = destinations_of(
+            job, {name: Path(file) for name, file in named.items() if file is not None}, keeps
+        )
 
     def __getitem__(self, name: str) -> Any:
         """Return the value of a parameter, by its kind; None if it is empty, and the WKT of a coordinate system."""
@@ -280,7 +282,7 @@ def check_rasterio(name: str) -> None:
         raise ParameterError(f"{name} needs the package rasterio: in a clone, run pip install .[cluster].")
 
 
-def destinations_of(job: Job, files: Mapping[str, Path]) -> dict[str, Destination]:
+def destinations_of(job: Job, files: Mapping[str, Path], keeps: bool = False) -> dict[str, Destination]:
     """Check that outputs can be written, make their folders, and return their destinations.
 
     Raises an error if a required output is missing, one could not be written after the run, or two are the same file.
@@ -289,7 +291,7 @@ def destinations_of(job: Job, files: Mapping[str, Path]) -> dict[str, Destinatio
     shared: dict[Path, Destination] = {}
     for one in job.outputs:
         if one.name not in files:
-            if one.required:
+            if one.required and not (keeps and isinstance(one, kinds.LayerOutput)):
                 raise ParameterError(one.refusal(None))
             continue
         path = files[one.name]

@@ -37,9 +37,9 @@ def __getattr__(name: str) -> Callable[..., Result]:
 def function_of(job: Job) -> Callable[..., Result]:
     """Return a job as a function whose arguments have the names of its parameters and outputs, in small letters.
 
-    What must be given comes first; files of outputs may be left out, because the result writes them as well.
+    What must be given comes first; files of layers may be left out, because the result writes them as well.
     """
-    stated = sorted((*job.parameters, *job.outputs), key=lambda one: not one.required)
+    stated = sorted((*job.parameters, *job.outputs), key=lambda one: (not one.required, not _is_needed(one)))
 
     def call(*args: Any, **given: Any) -> Result:
         values = signature.bind(*args, **given).arguments
@@ -51,7 +51,11 @@ def function_of(job: Job) -> Callable[..., Result]:
 
     first, later = Parameter.POSITIONAL_OR_KEYWORD, Parameter.KEYWORD_ONLY
     arguments = [
-        Parameter(one.name.lower(), first) if one.required else Parameter(one.name.lower(), later, default=one.default)
+        Parameter(
+            one.name.lower(),
+            first if one.required else later,
+            default=Parameter.empty if _is_needed(one) else one.default,
+        )
         for one in stated
     ]
     signature = Signature([*arguments, Parameter("progress", later, default=SILENT)], return_annotation=Result)
@@ -59,6 +63,11 @@ def function_of(job: Job) -> Callable[..., Result]:
     call.__name__, call.__signature__ = job.call, signature  # type: ignore[attr-defined]
     call.__doc__ = "\n".join([job.summary, "", job.help, "", "Parameters", "----------", *texts])
     return call
+
+
+def _is_needed(one: declaration.Parameter) -> bool:
+    """Return whether a value must be given: the result keeps layers, so that their files need not be named."""
+    return one.required and not isinstance(one, declaration.LayerOutput)
 
 
 def _spelled(one: declaration.Parameter) -> str:

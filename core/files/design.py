@@ -15,9 +15,12 @@ from ..design_numbers import GRADE, LENGTH, NUMBER, check_turn, checked
 from ..errors import ParameterError
 from ..progress import SILENT, Progress
 
-MAX_GAP_M = 0.001
+BREAK_M = 0.001
 """Largest distance between the end of an element and the start of the next, metres: the last decimal of the element
 table is a tenth of it, and design software takes a larger one for a break."""
+
+SAME_BEND = 1e-9
+"""Difference of two curvatures in 1/m, or of two gradients, that is none: rounding makes it of a straight end."""
 
 PROGRAM = "Rail Extract"
 
@@ -63,7 +66,7 @@ def check_joined(alignment: Alignment, progress: Progress = SILENT) -> None:
         for number, (one, after) in enumerate(zip(elements, elements[1:]), start=1):
             progress.check()
             gap_m = _gap_m(alignment, one, after)
-            if gap_m > MAX_GAP_M:
+            if gap_m > BREAK_M:
                 raise ParameterError(
                     f"Element {number} in layout {one.layout} of track {alignment.track_id} ends {gap_m:.3f} m from "
                     f"the start of element {number + 1}: run Fit alignment with the edited table as FIXED, which joins "

@@ -23,7 +23,7 @@ import numpy as np
 from ..alignment.elements import UNIT_NODES, UNIT_WEIGHTS, Alignment, CantElement, PlanElement, VerticalElement
 from ..alignment.stations import StationRange, Stations, stations_of
 from ..progress import SILENT, Progress
-from .design import PROGRAM, Delivery, names
+from .design import PROGRAM, SAME_BEND, Delivery, names
 
 GUID_DIGITS = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz_$"
 """Digits in which IFC writes a GUID, by value."""
@@ -284,9 +284,6 @@ class _Model:
 def _curves(segments: Sequence[Segment]) -> list[Ref]:
     return [one.curve for one in segments]
 
-
-SAME_BEND = 1e-9
-"""Difference of two curvatures in 1/m, or of two gradients, that is none."""
 
 ROUND, SMOOTH, BROKEN = (Enum("CONTSAMEGRADIENTSAMECURVATURE"), Enum("CONTSAMEGRADIENT"), Enum("DISCONTINUOUS"))
 """How a curve continues in the next: with its curvature, with its direction, or not."""

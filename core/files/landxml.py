@@ -19,7 +19,7 @@ import numpy as np
 from ..alignment.elements import Alignment, PlanElement, VerticalElement
 from ..alignment.stations import Stations, stations_of
 from ..progress import SILENT, Progress
-from .design import PROGRAM, Delivery, names
+from .design import PROGRAM, SAME_BEND, Delivery, names
 
 NAMESPACE = "http://www.landxml.org/schema/LandXML-1.2"
 
@@ -31,9 +31,6 @@ STRAIGHT = "INF"
 
 PARALLEL_RAD = 1e-9
 """Directions that differ by less have no intersection: that of the tangents of a spiral is then put in the middle."""
-
-STRAIGHT_PER_M = 1e-9
-"""Curvature of what rounding makes of a straight end, 1/m."""
 
 MIN_BREAK = 1e-6
 """Smallest break of the gradient, metres per metre, that becomes a point of its own: the element table is rounded to a
@@ -192,7 +189,7 @@ def _turns_right(alignment: Alignment, s: float, cant_m: float) -> bool:
     """Return whether the track turns right there; on a straight, whether cant would suit a curve to the right."""
     beside = alignment.curvatures(np.array([np.nextafter(s, -np.inf), s]))
     sharper = float(beside[np.argmax(np.abs(beside))])
-    return sharper < 0 if abs(sharper) > STRAIGHT_PER_M else cant_m >= 0
+    return sharper < 0 if abs(sharper) > SAME_BEND else cant_m >= 0
 
 
 def _write_equations(parent: ET.Element, stations: Stations, internal: float) -> None:

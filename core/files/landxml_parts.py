@@ -20,14 +20,15 @@ from ..design_numbers import CANT_MM, GRADE, LENGTH, NUMBER, RADIUS, Kind, check
 from ..errors import AlignmentFileError
 from ..frame import LocalFrame
 from ..progress import Progress
+from .design import BREAK_M
 
 MAX_MISFIT_M = 0.02
 """Largest difference between the stated ends of an element and those that its length and radii give, metres: programs
 that write millimetres stay below 3 mm."""
 
-MAX_GAP_M, SEEN_GAP_M = 0.1, 0.001
-"""Gap between two elements (in the profile, overlap of two curves) that is a mistake, and gap of which the user is
-told, metres: a published file of a railway has an overlap of 21 mm."""
+MAX_GAP_M = 0.1
+"""Gap between two elements (in the profile, overlap of two curves) that is a mistake, metres: the user is told
+of one of `BREAK_M`; a published file of a railway has an overlap of 21 mm."""
 
 MIN_BULGE_M = 0.005
 """Distance of a spiral's PI from its chord above which it shows to which side the spiral turns, metres: the PI may be
@@ -99,7 +100,7 @@ def placed(parts: Sequence[Part], frame: LocalFrame, east_first: bool, progress:
                 )
         made.append(_placed(part, s, frame, east_first))
         s += part.length_m
-    if widest_m > SEEN_GAP_M:
+    if widest_m > BREAK_M:
         progress.warning(f"The elements up to the {parts[-1].where} have gaps of up to {1000 * widest_m:.1f} mm.")
     return tuple(made)
 
@@ -204,7 +205,7 @@ def _tangents_and_curves(
             raise AlignmentFileError(
                 f"Two curves of the profile of the {name} overlap by {-tangent_m:.2f} m at {done:.2f} m: repair it."
             )
-        if tangent_m > SEEN_GAP_M:
+        if tangent_m > BREAK_M:
             yield VerticalElement(done, tangent_m, height, grade, grade)
             done, height = done + tangent_m, height + tangent_m * grade
         length_m = lengths[number + 1]

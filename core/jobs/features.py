@@ -125,6 +125,17 @@ def read_lines(source: FeatureSource, progress: Progress) -> LayerLines:
     return LayerLines.of(source.name, parts, source.fields, system, progress)
 
 
+def read_lines_in(source: FeatureSource, crs_wkt: str | None, progress: Progress) -> LayerLines:
+    """Read the same lines in another coordinate system; errors as for `read_lines`, or they can't be transformed."""
+    parts = (
+        (feature.number, feature.row, moving)
+        for feature in _placed(source, crs_wkt)
+        for moving in map(_moving, feature.of_kind(LINE))
+        if len(moving) > 1
+    )
+    return LayerLines.of(source.name, parts, source.fields, system_of(crs_wkt or source.crs_wkt, progress), progress)
+
+
 def read_rows(source: FeatureSource, progress: Progress) -> Rows:
     """Read the values of all features, and the names of their fields."""
     return [row for _, row in progress.follow(source.rows(), source.count)], source.fields

@@ -23,15 +23,12 @@ from ..frame import ORIGIN_STEP, LocalFrame
 from ..polyline import Polyline, project
 from ..progress import SILENT, Progress
 from ..rails import NO_GAPS, SAME_SUM_M, Centerline, RailLine
-from ..standards import GAUGE_RANGE_MM, HEAD_WIDTH_RANGE_MM
+from ..standards import SPACING_RANGE_M
 from .clouds import check_same_plane
 from .values import Values
 
 Row = Mapping[str, Any]
 Made = TypeVar("Made")
-
-BOTH_RAILS_M = (GAUGE_RANGE_MM[1] + HEAD_WIDTH_RANGE_MM[1]) / 1000
-"""Largest distance between the two rails of a track, metres; pieces of one rail are closer than a quarter of it."""
 
 MAX_WHOLE, ID = 2**31 - 1, re.compile(r"\s*\d{1,10}\s*")
 """Largest whole number of a field in every format, and an id in a list of them."""
@@ -139,8 +136,9 @@ class LayerLines:
         for _, row, xyz in self.parts:
             track = str(row.get("track_ids") or "")
             mates = [one for one in rails[track] if one is not xyz] if ID.fullmatch(track) else []
-            across = project([xyz], np.concatenate(mates)[:, :2], BOTH_RAILS_M).across if mates else np.empty(0)
-            across = across[np.abs(across) > BOTH_RAILS_M / 4]
+            most_m = SPACING_RANGE_M[1]  # pieces of one rail are closer than a quarter of it
+            across = project([xyz], np.concatenate(mates)[:, :2], most_m).across if mates else np.empty(0)
+            across = across[np.abs(across) > most_m / 4]
             yield f" ({'right' if np.median(across) > 0 else 'left'} in track {track})" if len(across) else ""
 
     def _made(

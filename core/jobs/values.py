@@ -213,14 +213,16 @@ class Values(ABC):
         """Whether the result stays after the run, so that its layers can be had without naming files."""
         return False
 
-    def request(self, class_codes: Sequence[int], progress: Progress, unreadable: list[str] | None = None) -> Request:
+    def request(
+        self, class_codes: Sequence[int], progress: Progress, unreadable: list[str] | None = None, name: str = "INPUT"
+    ) -> Request:
         """Check which points are to be read, and read the headers of the files; see `request_points`."""
         bounds = self.extent if self.has("EXTENT") else lambda _: None
-        return request_points(self.cloud(), class_codes, bounds, progress, unreadable)
+        return request_points(self.cloud(name), class_codes, bounds, progress, unreadable)
 
-    def cloud_crs(self) -> str | None:
+    def cloud_crs(self, name: str = "INPUT") -> str | None:
         """Return the coordinate system of the cloud; see `checked_crs`."""
-        return checked_crs(self.cloud())
+        return checked_crs(self.cloud(name))
 
     def has(self, name: str) -> bool:
         """Return whether the job has a parameter."""

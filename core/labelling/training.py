@@ -34,9 +34,6 @@ FOLDER_SUFFIX = "_training"
 
 SOURCE, EXAMPLES = "source.json", "examples"
 
-READING = 0.1
-"""Share of a training that reading takes, for the progress."""
-
 
 def check_training(weights: Path, plan: Plan) -> None:
     """Check what can be checked before a cloud is read.
@@ -69,7 +66,7 @@ def train_classifier(
     from ..learned.training import TrainingSettings, train
 
     folder = folder_of(weights.file)
-    reading, learning = progress.divide((READING, 1 - READING))
+    reading, learning = progress.after_reading()
     with writing(folder.parent):
         examples = _examples(request, settings, plan, folder, reading)
         reading.set_fraction(1.0)

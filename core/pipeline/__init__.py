@@ -47,8 +47,8 @@ from ..tracks.geometry import measure_track_geometry
 from ..tracks.parallels import widths_by_gauge
 from .sources import Source
 
-DRAWING, PAIRING, MEASURING = 0.72, 0.04, 0.04
-"""Run times of the steps relative to each other, for the progress: squares, tracks, track geometry."""
+DRAWING = 0.9
+"""Share of the run time that the squares take, for the progress; tracks and their geometry share the rest."""
 
 CLEAN_S, DRAW_S = 1.5e-5, 2.5e-5
 """Run times per point, in seconds, of the two tasks of a square: cleaning its raster with the network, and drawing its
@@ -110,7 +110,7 @@ def extract_files(
     point of the requested classes is in the files and the extent, and RailExtractError if every square failed.
     """
     recording = Recording(progress)
-    sorting, walking = recording.divide((source.run_time, DRAWING + PAIRING + MEASURING))
+    sorting, walking = recording.divide((source.run_time, 1.0))
     with source.sort(folder, parameters, runner, sorting) as points:
         return replace(_walk(points, parameters, runner, walking), warnings=recording.warnings)
 
@@ -118,7 +118,8 @@ def extract_files(
 def _walk(points: SortedPoints, parameters: Parameters, runner: Runner, progress: Progress) -> RailNetwork:
     """Extract rails, centerlines and track geometry from points that are sorted into squares."""
     progress = Recording(progress)
-    drawing, pairing, measuring = progress.divide((DRAWING, PAIRING, MEASURING))
+    drawing = progress.span(0, DRAWING)
+    pairing, measuring = progress.span(DRAWING, 1).split(2)
     points = replace(points, classes=plausible(points.classes, progress))
     network, strips, points = _drawn(points, parameters, runner, drawing)
     network = _paired(network, points, parameters, runner, pairing)

@@ -29,10 +29,10 @@ from ..standards import RAIL_CLASS
 from ..tiles.grid import SortedPoints, parted
 from ..tiles.store import Census, SpooledFile, gather, spool_file
 
-READING = 0.2
+READING = 0.25
 """Run time of sorting rail points relative to that of the walk, for the progress."""
 
-FINDING = 4.0
+FINDING = 5.0
 """The same of finding them in a raw cloud, which has 10 to 100 times as many points."""
 
 

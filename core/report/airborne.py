@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..airborne.ridges import STATION_M
+from ..airborne.guide_line import STATION_M
 from ..airborne.survey import FLIGHT, AirborneSurvey, AirborneTrack
 from ..checks.listing import OFF_RAIL_MM, Finding
 from ..progress import counted, metres, written

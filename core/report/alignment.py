@@ -17,6 +17,7 @@ from ..alignment.measured import Deviations
 from ..alignment.stations import StationRange, stations_of
 from ..checks.findings import largest, rms
 from ..progress import metres
+from ..tracks.geometry import GRADE_BASE_M, HALF_CHORD_M
 from .markup import figure, legend, made, page, section, table, tag, text, tiles
 from .page import stated
 from .plots import LEFT, SPACE, STEP_M, TICKS_ACROSS, WIDTH, Curve, Frame, Panel, across, bottom_of, broken, round_up
@@ -40,10 +41,6 @@ ROW_M = 1000.0
 
 STRIP, LABEL = 22.0, 46.0
 """Height of the strip of elements, and the least width of an element with a text, in units of the picture."""
-
-HALF_CHORD_M, HALF_BASE_M = 10, 5
-"""Distances between the three points whose circle gives the measured curvature, and from a place to the two points
-that give its gradient, metres: those of the track geometry."""
 
 ALIGNMENT_STYLE = """
 svg .frame { fill: none; stroke: var(--line); }
@@ -180,13 +177,13 @@ def measured_curvature(alignment: Alignment, found: Deviations) -> np.ndarray:
     """Return the curvature of the measured track, (n,) 1/m, on chords of 20 m; NaN near its ends."""
     heading = alignment.headings(found.s)
     left = np.column_stack([-np.sin(heading), np.cos(heading)])
-    return _along(alignment.places(found.s) + left * found.slew_mm[:, None] / 1000, found.s, HALF_CHORD_M, _bend)
+    return _along(alignment.places(found.s) + left * found.slew_mm[:, None] / 1000, found.s, int(HALF_CHORD_M), _bend)
 
 
 def measured_grade(alignment: Alignment, found: Deviations) -> np.ndarray:
     """Return the gradient of the measured track, (n,), over 10 m; NaN near its ends."""
     z = alignment.heights(found.s) + found.lift_mm / 1000
-    return _along(np.column_stack([found.s, z]), found.s, HALF_BASE_M, _slope)
+    return _along(np.column_stack([found.s, z]), found.s, int(GRADE_BASE_M / 2), _slope)
 
 
 def _bend(before: np.ndarray, at: np.ndarray, after: np.ndarray) -> np.ndarray:

@@ -12,7 +12,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ...core.airborne.files import Run, survey_files
-from ...core.airborne.fitting import REASONS, STATION_M
+from ...core.airborne.fitting import REASONS
+from ...core.airborne.guide_line import STATION_M
 from ...core.airborne.survey import SWITCH, AirborneSurvey, AirborneTrack, GuideLine
 from ...core.clouds.points import ask
 from ...core.parameters import AirborneParameters

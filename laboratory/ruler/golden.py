@@ -22,6 +22,7 @@ from ..airborne.catalogue import FLOWN, FlownScene
 from ..designs import TRACKS, TrackScene
 from ..scenes.adversarial import ADVERSARIAL
 from ..scenes.catalogue import SCENES
+from ..scenes.gauges import GAUGES, GaugeScene
 from ..scenes.layouts import LAYOUTS
 from ..scenes.mixed import MIXED, RAW_MIXED
 from ..scenes.raw import RawScene
@@ -31,21 +32,24 @@ from ..scenes.whole_rails import WHOLE
 from .airborne import survey_figures
 from .alignments import fit_figures
 from .classification import score
+from .clearance import clearance_figures
 from .lines import Match, match
 from .measuring import QUALITY_STEP_M, local_sigma
 
-AnyScene = Union[Scene, RawScene, FlownScene, TrackScene]
+AnyScene = Union[Scene, RawScene, FlownScene, TrackScene, GaugeScene]
 
 DRAWN: dict[str, Callable[..., Scene]] = {**SCENES, **ADVERSARIAL, **LAYOUTS, **WHOLE, **MIXED}
 """Scenes of classified points, by name."""
 
-RAW, GUIDED, FITTED = "raw ", "guide ", "fit "
-"""What the names of raw scenes begin with, of those that are flown, and of tracks to which alignments are fitted."""
+RAW, GUIDED, FITTED, SWEPT = "raw ", "guide ", "fit ", "gauge "
+"""What the names of raw scenes begin with, of scenes that are flown, of tracks to which alignments are fitted, and of
+scenes through which a profile is swept."""
 
 SEEDED: dict[str, tuple[Callable[[int], AnyScene], int]] = {
     **{RAW + name: (make, 2026) for name, make in {**RAW_SCENES, **RAW_MIXED}.items()},
     **{GUIDED + name: (make, 3) for name, make in FLOWN.items()},
     **{FITTED + name: (make, 7) for name, make in TRACKS.items()},
+    **{SWEPT + name: (make, 5) for name, make in GAUGES.items()},
 }
 """Other scenes, by name, and their seeds."""
 
@@ -60,6 +64,7 @@ QUICK = (
     *("raw turnout 1:9", "raw metro", "raw crossing", "raw air 80", "raw photo curve", "raw car park"),
     *(GUIDED + name for name in FLOWN),
     *(FITTED + name for name in TRACKS),
+    *(SWEPT + name for name in GAUGES),
 )
 """Scenes that a test runs: at least one for each kind of place."""
 
@@ -141,6 +146,8 @@ def figures_of(place: str, scene: AnyScene, variant: Variant = PLAIN) -> Figures
         return fit_figures(scene)
     if isinstance(scene, FlownScene):
         return survey_figures(scene)
+    if isinstance(scene, GaugeScene):
+        return clearance_figures(scene)
     if isinstance(scene, RawScene):
         return _raw_figures(scene, wide=place[len(RAW) :] in AIR)
     return line_figures(scene, extract_rails([scene.rail_points()], parameters_of(scene, variant)))

@@ -28,6 +28,18 @@ WORDS = {
     },
     "TRANSITIONS": {JUMPS: "Clothoids, or none", CLOTHOIDS: "Clothoids everywhere"},
     "VERTICAL_CURVES": {"CIRCLES": "Circles, as for railways", "PARABOLAS": "Parabolas, as for roads"},
+    "PROFILE": {
+        **{"EBO_G1": "Reference line G1 (EBO annex 7)", "EBO_G2": "Reference line G2 (EBO annex 8)"},
+        "EBO_LIMIT_LARGE": "Limit of the free space, through tracks (EBO annex 1)",
+        "EBO_LIMIT_SMALL": "Limit of the free space, other tracks (EBO annex 1)",
+        **{"EBO_MAIN": "Structure gauge, main tracks (EBO)", "EBO_OTHER": "Structure gauge, other tracks (EBO)"},
+        "EBO_MAIN_15KV": "Structure gauge, main tracks at 15 kV (EBO)",
+        "EBO_MAIN_25KV": "Structure gauge, main tracks at 25 kV (EBO)",
+        **{"US_WA": "Washington", "US_WA_TUNNEL": "Washington, tunnels and bridges"},
+        CUSTOM: "Custom: profile from a file",
+    },
+    "WIDENING": {"NONE": "None", "EBO": "By the German regulations (EBO)"},
+    "TRAINS": {"MARK": "Name them, do not count them", "LEAVE_OUT": "Leave them out"},
     "TORCH": {"NONE": "Do not install", "CPU": "For the processor (CPU)", "CUDA": "For an Nvidia GPU"},
 }
 """Words by id, by parameter."""

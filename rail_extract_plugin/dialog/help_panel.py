@@ -23,6 +23,7 @@ PAGES = {
     "stationing": "Kilometres along an axis",
     "alignment": "How elements are fitted",
     "comparison": "How surveys are compared",
+    "clearance": "Clearance: frame, profiles, limits",
     "tutorial": "Tutorial",
     "limits": "Limits",
     "troubleshooting": "If something is wrong",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 SECTIONS = {
-    "Cloud": ("MERGE_CLASSES", "CLASSES", "EXTENT", "MASK", "CRS", "LEAVE_OUT"),
+    "Cloud": ("MERGE_CLASSES", "CLASSES", "CLASSES_OUT", "EXTENT", "MASK", "CRS", "LEAVE_OUT"),
     "Raw clouds": (
         *("METHOD", "WEIGHTS", "SEEDS", "SEED", "GUIDE", "GUIDE_DISTANCE", "ONLY_GUIDED", "KEEP_SINGLE", "RAIL_CLASS"),
         *("CONTENT", "RESET", "START", "MINUTES", "BOTH", "SEARCH", "THICKNESS", "WINDOW", "MIN_HEIGHT"),
@@ -18,6 +18,7 @@ SECTIONS = {
         *("GAUGE", "HEAD_WIDTH", "OTHER_GAUGES", "CENTERLINE_TOLERANCE", "RAIL_HEIGHT", "REFERENCE_RAILS", "QUALITY"),
         *("RAILS", "REFERENCE_SIGMA", "INPUT_SIGMA", "REACH", "STEP", "TRANSITIONS", "ROUND", "FIXED"),
     ),
+    "Clearance": ("PROFILE_FILE", "MARGIN", "WIDENING", "FLOOR", "TRAINS", "DISTANCE"),
     "Axis": ("AXIS", "START_KM", "POSTS", "POST_FIELD", "JUMPS", "DIRECTION", "FORMAT"),
     "Computer": ("WORKERS",),
     "Files of alignments": ("VERTICAL_CURVES", "EAST_FIRST"),

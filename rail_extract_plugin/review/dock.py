@@ -112,6 +112,8 @@ class ReviewDock(QDockWidget):
         gone = self._layer is not None and (sip.isdeleted(self._layer) or self._layer not in layers)
         if self._layer is None or gone:
             self.show_layer(layers[0].id() if layers else None)
+        elif self._sections is not None and self._sections.lacks_stations:
+            self.show_layer(self._layer.id())  # QGIS adds the layers of a run one by one
         else:
             self.layers.setCurrentIndex(self.layers.findData(self._layer.id()))
 
@@ -126,7 +128,8 @@ class ReviewDock(QDockWidget):
         self._sections = Sections(self._layer, self._found) if self._layer else None
         self.layers.setCurrentIndex(self.layers.findData(layer_id))
         if self._sections is not None and self._found and self._sections.cloud and not self._sections.note:
-            self._task = ReadingTask(self._sections.cloud, self._sections.places, self._keep_points)
+            shown = self._sections
+            self._task = ReadingTask(self._sections.cloud, shown.places, shown.reach_m, self._keep_points)
             QgsApplication.taskManager().addTask(self._task)
         undecided = (number for number, one in enumerate(self._found) if one.decision == OPEN)
         self._at = next(undecided, 0)
@@ -244,13 +247,12 @@ class ReviewDock(QDockWidget):
         shown = self._found[self._at]
         decided = sum(one.decision != OPEN for one in self._found)
         self.count.setText(f"{self._at + 1} of {len(self._found)}; {decided} reviewed")
-        reason = shown.value("reason") or ""
-        _say(self.reason, f"{reason[:1].upper()}{reason[1:]}")
+        _say(self.reason, f"{shown.reason[:1].upper()}{shown.reason[1:]}")
         _say(self.text, " ".join((f"{shown.where}: {shown.figures}.", *self._missing(shown), *_section(shown))))
         picture = self._sections.picture(shown)
         self.view.show_picture(picture)
         nothing = picture.points is None or not len(picture.points)
-        empty = "There is no rail point here." if nothing else ""
+        empty = "There is no point here." if nothing else ""
         _say(self.note, "Reading the points…" if self.is_reading else picture.note or empty)
 
     def _missing(self, shown: Review) -> list[str]:
@@ -266,7 +268,7 @@ def _places(found: Sequence[Review]) -> dict[int, bytes]:
 
 def _section(shown: Review) -> list[str]:
     """Say where the cross-section is."""
-    at_m = shown.value("worst_m")
+    at_m = shown.at_m
     return [] if at_m is None else [f"Cross-section at {at_m:,.1f} m."]
 
 

@@ -11,8 +11,8 @@ from ...core.fields import FINDING_FIELDS
 ACCEPTED, REJECTED, OPEN = "accepted", "rejected", ""
 """Values of the field `review`."""
 
-NEEDED = {"finding", "reason", "review"}
-"""Fields by which a layer of findings is recognized; shapefiles keep their names, too."""
+NEEDED = {"finding", "reason", "review"}, {"intrusion", "pen_mm", "review"}
+"""Fields by which layers of findings and of intrusions are recognized; shapefiles keep their names, too."""
 
 
 def findings_layers() -> list[QgsVectorLayer]:
@@ -22,8 +22,11 @@ def findings_layers() -> list[QgsVectorLayer]:
 
 
 def is_findings(layer) -> bool:
-    """Return whether a layer has the fields of findings."""
-    return isinstance(layer, QgsVectorLayer) and layer.isValid() and set(layer.fields().names()) >= NEEDED
+    """Return whether a layer has the fields of findings, or of intrusions."""
+    if not isinstance(layer, QgsVectorLayer) or not layer.isValid():
+        return False
+    names = set(layer.fields().names())
+    return any(names >= needed for needed in NEEDED)
 
 
 @dataclass(frozen=True)
@@ -44,6 +47,29 @@ class Review:
         return self.value("review") or OPEN
 
     @property
+    def is_intrusion(self) -> bool:
+        """Whether it is an object inside a profile."""
+        return self.value("pen_mm") is not None
+
+    @property
+    def number(self) -> int | None:
+        """Number in the layer."""
+        return self.value("intrusion") if self.is_intrusion else self.value("finding")
+
+    @property
+    def reason(self) -> str:
+        """Why to look there."""
+        if not self.is_intrusion:
+            return self.value("reason") or ""
+        doubt = "" if self.value("sure") else ", in doubt"
+        return ", ".join(filter(None, (f"{self.value('pen_mm'):.1f} mm inside{doubt}", self.value("what"))))
+
+    @property
+    def at_m(self) -> float | None:
+        """Chainage of the worst place."""
+        return self.value("chainage_m") if self.is_intrusion else self.value("worst_m")
+
+    @property
     def where(self) -> str:
         """Track or rail and chainages."""
         rail, track = self.value("rail_id"), self.value("track_id")
@@ -57,6 +83,9 @@ class Review:
         written = {"doubt_m": "{:,.1f} m in doubt", "gauge_mm": "gauge {:.1f} mm", "cant_mm": "cant {:.1f} mm"}
         written |= {"sigma_mm": "standard error {:.1f} mm across", "sigmaz_mm": "{:.1f} mm in height"}
         written |= {"points": "{:,} points"}
+        if self.is_intrusion:
+            written = {"sigma_mm": "standard error {:.1f} mm", "side": "on the {}", "w_mm": "{:.0f} mm above the rails"}
+            written |= {"points": "{:,} points", "class_code": "class {}"}
         known = {name: self.value(name) for name in written}
         return ", ".join(written[name].format(known[name]) for name in written if known[name] is not None)
 
@@ -73,7 +102,7 @@ def reviews(layer: QgsVectorLayer) -> list[Review]:
     """Return the findings of a layer that have a place, in their order."""
     found = [Review(feature) for feature in layer.getFeatures() if feature.hasGeometry()]
     last = len(FINDING_FIELDS) + len(found)
-    return sorted(found, key=lambda one: (one.value("finding") or last, one.feature.id()))
+    return sorted(found, key=lambda one: (one.number or last, one.feature.id()))
 
 
 def decide(layer: QgsVectorLayer, review: Review, decision: str) -> str:

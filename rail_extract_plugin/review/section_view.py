@@ -23,6 +23,12 @@ WHOLE = 0.35
 WHOLE_HEIGHT_M = 0.8
 """Height that the whole section shows at least: both heads of a track with the largest cant, and what is near."""
 
+WIDE_WIDTH_M, WIDE_HEIGHT_M, WIDE_UP_M = 7.0, 6.4, 2.6
+"""Width, height and height of the middle of the whole cross-section of an object inside a profile."""
+
+MARK_PX = 7.0
+"""Radius of the ring around the worst place."""
+
 HEAD_M = 0.04
 """Height of the outline of a head without points: about as high as heads of all profiles."""
 
@@ -60,13 +66,13 @@ class SectionView(QWidget):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._picture: Picture | None = None
+        self.picture: Picture | None = None
         self.setMinimumHeight(140)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
 
     def show_picture(self, picture: Picture | None) -> None:
         """Draw another picture."""
-        self._picture = picture
+        self.picture = picture
         self.update()
 
     def sizeHint(self) -> QSize:
@@ -78,16 +84,20 @@ class SectionView(QWidget):
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         painter.fillRect(self.rect(), PAPER)
-        if self._picture is not None:
-            for panel in self._panels(self._picture):
+        if self.picture is not None:
+            for panel in self._panels(self.picture):
                 painter.save()
                 painter.setClipRect(panel.box)
-                _draw(painter, panel, self._picture)
+                _draw(painter, panel, self.picture)
                 painter.restore()
         painter.end()
 
     def _panels(self, picture: Picture) -> Iterator[Panel]:
         """Yield the whole section, and the nearest rail on either side; only one where none is on the other side."""
+        if picture.mark is not None:
+            box = QRectF(0, 0, float(self.width()), float(self.height()))
+            yield Panel(box, 0.0, WIDE_UP_M, WIDE_WIDTH_M, WIDE_HEIGHT_M, "left – right")
+            return
         whole, one, other = _boxes(float(self.width()), float(self.height()))
         yield Panel(whole, 0.0, 0.0, 2 * REACH_M, WHOLE_HEIGHT_M, "left" + " – " + "right")
         is_left = picture.rails[:, 0] < 0
@@ -120,6 +130,9 @@ def _draw(painter: QPainter, panel: Panel, picture: Picture) -> None:
     for right, up in picture.points if picture.points is not None else ():
         painter.drawEllipse(panel.place(right, up), POINT_PX, POINT_PX)
     painter.setBrush(Qt.BrushStyle.NoBrush)
+    if picture.mark is not None:
+        painter.setPen(QPen(RAIL, 2.0))
+        painter.drawEllipse(panel.place(*picture.mark.tolist()), MARK_PX, MARK_PX)
     for (right, up), missing in zip(picture.rails, picture.missing):
         place, half = panel.place(right, up), 0.5 * picture.head_width_m * panel.scale
         painter.setPen(QPen(RAIL, 1.6, Qt.PenStyle.DashLine if missing else Qt.PenStyle.SolidLine))

@@ -25,6 +25,12 @@ if TYPE_CHECKING:
 REACH_M = 2.0
 """Distance from the place up to which points are shown: both rails of any track, and what lies next to them."""
 
+WIDE_M = 6.0
+"""The same for objects inside a profile, whose whole cross-section is shown."""
+
+MOST_DRAWN = 6000
+"""Points of a whole cross-section that are drawn: more take longer than a blink."""
+
 THICKNESS_M = 0.5
 """Points up to this far ahead and behind are shown: fewer than this would not show the heads in sparse clouds."""
 
@@ -55,7 +61,8 @@ class Picture:
     """What a cross-section shows, metres to the right and up as seen along the track.
 
     Points are None until they are read. A rail that is missing has no points here: it is where the line is drawn, or
-    opposite to the other one. The note says what is missing, and why.
+    opposite to the other one. The note says what is missing, and why. The mark is the worst place of an object inside a
+    profile, whose whole cross-section is shown.
     """
 
     points: np.ndarray | None
@@ -63,6 +70,7 @@ class Picture:
     missing: np.ndarray
     head_width_m: float
     note: str = ""
+    mark: np.ndarray | None = None
 
 
 class Sections:
@@ -71,12 +79,18 @@ class Sections:
     def __init__(self, layer: QgsVectorLayer, found: Sequence[Review]) -> None:
         self.cloud = cloud_of(layer)
         self._units_m = np.array(self.cloud.units_m if self.cloud else (1.0, 1.0, 1.0))
-        self._planes: dict[int, CrossSection] = {one.feature.id(): self._plane(one) for one in found}
         self._run = layer.customProperty(RUN)
+        is_clearance = any(one.is_intrusion for one in found)
+        self._stations = _stations_of_run(self._run) if is_clearance else {}
+        self.lacks_stations = is_clearance and not self._stations
+        self._planes: dict[int, CrossSection] = {one.feature.id(): self._plane(one) for one in found}
+        self.reach_m = WIDE_M if self._stations else REACH_M
         self.points: dict[int, np.ndarray] = {}
         self.note = "" if self.cloud else "The layer does not state its cloud: only rails are shown."
         if self.cloud and not all(Path(path).exists() for path in self.cloud.paths):
             self.note = f"{self.cloud.name} is not at its place any more: only rails are shown."
+        if self.lacks_stations:
+            self.note = "Load the output Clearance of the same run to see cross-sections."
 
     @property
     def places(self) -> dict[int, np.ndarray]:
@@ -92,6 +106,10 @@ class Sections:
         if points is not None:
             seen = plane.seen(points)
             shown = seen[np.abs(seen[:, 0]) <= THICKNESS_M, 1:]
+        if review.is_intrusion:
+            mark = plane.seen(self._line(review)[:1])[0, 1:]
+            thin = None if shown is None else shown[:: max(len(shown) // MOST_DRAWN, 1)]
+            return Picture(thin, np.nan_to_num(rails), missing, width_m, self.note, mark)
         level = np.array([0.0, _level(rails, shown)])
         moved = None if shown is None else shown - level
         return Picture(moved, np.nan_to_num(rails - level), missing, width_m, self.note)
@@ -121,7 +139,20 @@ class Sections:
     def _plane(self, review: Review) -> CrossSection:
         from ...core.clouds.cross_sections import cross_section_at
 
-        return cross_section_at(self._line(review), review.worst_share)
+        if not review.is_intrusion:
+            return cross_section_at(self._line(review), review.worst_share)
+        stations, at_m = self._stations.get(review.value("track_id")), review.at_m
+        if stations is None or at_m is None:
+            place = self._line(review)[0]
+            return cross_section_at(np.array([place, place + [1.0, 0.0, 0.0]]), 0.0)
+        after = int(np.clip(np.searchsorted(stations[:, 0], at_m), 1, len(stations) - 1))
+        (start, *first), (end, *second) = stations[after - 1] * self._scale, stations[after] * self._scale
+        return cross_section_at(np.array([first, second]), float((at_m - start) / (end - start)))
+
+    @property
+    def _scale(self) -> np.ndarray:
+        """Units of chainage, x, y and z."""
+        return np.append(1.0, self._units_m)
 
     def _rails(self, plane: CrossSection, review: Review, width_m: float) -> tuple[np.ndarray, np.ndarray]:
         """Return where the rails are in a plane, (k, 2), and which of them have no points there, (k,)."""
@@ -149,10 +180,14 @@ class ReadingTask(QgsTask):
     """
 
     def __init__(
-        self, cloud: RunCloud, places: Mapping[int, np.ndarray], done: Callable[[dict[int, np.ndarray], str], None]
+        self,
+        cloud: RunCloud,
+        places: Mapping[int, np.ndarray],
+        reach_m: float,
+        done: Callable[[dict[int, np.ndarray], str], None],
     ) -> None:
         super().__init__("Rail Extract: cross-sections", QgsTask.Flag.CanCancel)
-        self._cloud, self._places, self._done = cloud, dict(places), done
+        self._cloud, self._places, self._reach_m, self._done = cloud, dict(places), reach_m, done
         self._points: dict[int, np.ndarray] = {}
         self._error = ""
 
@@ -163,7 +198,7 @@ class ReadingTask(QgsTask):
             from ...core.clouds.points import ask
 
             request = ask(self._cloud.paths, self._cloud.class_codes, self._cloud.crs_wkt)
-            found = points_near(request, list(self._places.values()), REACH_M, TaskProgress(self))
+            found = points_near(request, list(self._places.values()), self._reach_m, TaskProgress(self))
             self._points = dict(zip(self._places, found))
         except Cancelled:
             return False
@@ -196,6 +231,18 @@ def _crossings(rail: Rail, plane: CrossSection) -> tuple[np.ndarray, np.ndarray]
     rights, ups, at_m = (one[numbers] + share * (one[numbers + 1] - one[numbers]) for one in (right, up, along))
     near = np.abs(rights) <= REACH_M
     return np.column_stack([rights, ups])[near], at_m[near]
+
+
+def _stations_of_run(run: str | None) -> dict[int, np.ndarray]:
+    """Return chainage, x, y and z of the stations of the clearance of a run, (n, 4), by track."""
+    found: dict[int, list[list[float]]] = {}
+    for layer in QgsProject.instance().mapLayers().values():
+        is_mine = run and layer.customProperty(RUN) == run and isinstance(layer, QgsVectorLayer)
+        if is_mine and layer.fields().lookupField("lmar_mm") >= 0:
+            for feature in layer.getFeatures():
+                place = [feature["chainage_m"], *vertices_of(feature)[0]]
+                found.setdefault(feature["track_id"], []).append(place)
+    return {track: np.array(sorted(rows)) for track, rows in found.items() if len(rows) > 1}
 
 
 def _rails_of_run(run: str | None, units_m: np.ndarray) -> list[Rail]:

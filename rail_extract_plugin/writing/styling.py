@@ -23,8 +23,8 @@ from ..paths import STYLES
 from .run import LAYER, RUN, name_run
 from .view_3d import show_lines_in_3d
 
-FINDINGS = "findings"
-"""Style of the findings, which the user is asked to review."""
+FINDINGS = "findings", "intrusions"
+"""Styles of the layers that the user is asked to review."""
 
 STYLE = "rail_extract/style"
 """Name of the property that states the style of a layer."""
@@ -32,8 +32,8 @@ STYLE = "rail_extract/style"
 NO_PROPERTIES: Mapping[str, str] = {}
 
 TOP_TO_BOTTOM = (
-    *("stops", "findings", "differences", "elements", "deviations", "axes", "centerlines", "airborne", "rails"),
-    *("stations", "quality", "places", "raster"),
+    *("stops", "findings", "intrusions", "differences", "elements", "deviations", "axes", "wires", "platforms"),
+    *("centerlines", "airborne", "rails", "stations", "quality", "clearance", "places", "raster"),
 )
 """Order of the layers of a run, by style: what is to be looked at first, then the lines, and what they rest on."""
 
@@ -62,7 +62,7 @@ class _Styler(QgsProcessingLayerPostProcessorInterface):
         if run:
             _put_into_group(layer, run)
         layer.triggerRepaint()
-        if self._style == FINDINGS:
+        if self._style in FINDINGS:
             notices.findings_loaded.emit(layer.id())
 
 

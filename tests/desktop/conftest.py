@@ -13,6 +13,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rail_extract.core.disk import Destination
+from rail_extract.core.fields import CENTERLINES, RAILS
+from rail_extract.core.files.layers import lines_layer
+from rail_extract.core.files.writing import write_layers
+from rail_extract.core.frame import LocalFrame
+from rail_extract.laboratory.scenes import clearance
 from rail_extract.laboratory.scenes.las import write_las
 from rail_extract.laboratory.scenes.raw import scan_world
 from rail_extract.laboratory.scenes.raw_catalogue import BLUNT, STANDARD, line, parallel
@@ -93,7 +99,23 @@ def blunt_cloud(tmp_path_factory):
 
 
 @pytest.fixture(scope="session")
-def run_scenario(tmp_path_factory, raw_cloud, blunt_cloud, labelled_cloud):
+def gauge_folder(tmp_path_factory):
+    """A folder with a cloud, `cloud.las`, of 90 m of curve with two plates in EBO_G1, and its lines, `lines.gpkg`."""
+    folder = tmp_path_factory.mktemp("gauge")
+    scene = clearance.double_track(1, 500.0, clearance.SHORT, apart_m=0.0)
+    clearance.bed(scene)
+    for at, depth_m in ((30.0, 0.030), (50.0, 0.080)):
+        clearance.plate(scene, at, 1, 1.645 - depth_m, (1.5, 2.5))
+    clearance.platform(scene, (10.0, 80.0), -1, 1.70, 0.55)
+    clearance.write_points(folder / "cloud.las", scene.points, scene.codes)
+    tracks, rails = clearance.lines_of(scene)
+    layers = [lines_layer(RAILS, rails), lines_layer(CENTERLINES, tracks)]
+    write_layers(layers, Destination.at(folder / "lines.gpkg"), LocalFrame(np.zeros(3)))
+    return folder
+
+
+@pytest.fixture(scope="session")
+def run_scenario(tmp_path_factory, raw_cloud, blunt_cloud, labelled_cloud, gauge_folder):
     """Run a scenario, once: tests share what it found. One that goes on has the profile of another one."""
     programs = {name: shutil.which(name) for name in ("qgis", "xvfb-run")}
     if not all(programs.values()) or "QGIS_PROCESS" not in os.environ:
@@ -115,6 +137,7 @@ def run_scenario(tmp_path_factory, raw_cloud, blunt_cloud, labelled_cloud):
             "RAIL_EXTRACT_RAW": str(raw_cloud),
             "RAIL_EXTRACT_BLUNT": str(blunt_cloud),
             "RAIL_EXTRACT_LABELLED": str(labelled_cloud),
+            "RAIL_EXTRACT_GAUGE": str(gauge_folder),
             "RAIL_EXTRACT_ZIP": str(ROOT / "build" / "rail_extract.zip"),
         }
         for name in ("QGIS_PLUGINPATH", "QGIS_CUSTOM_CONFIG_PATH"):

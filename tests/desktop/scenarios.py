@@ -25,7 +25,6 @@ from qgis.core import (
     QgsProject,
     QgsRectangle,
     QgsSettings,
-    QgsVectorFileWriter,
     QgsVectorLayer,
 )
 from qgis.PyQt import sip
@@ -50,8 +49,8 @@ from qgis.PyQt.QtWidgets import (
 )
 from qgis.utils import iface, loadPlugin, plugins, reloadPlugin, startPlugin, unloadPlugin
 
-RAW, BLUNT, LABELLED, SAMPLE, ARCHIVE = (
-    os.environ[f"RAIL_EXTRACT_{name}"] for name in ("RAW", "BLUNT", "LABELLED", "SAMPLE", "ZIP")
+RAW, BLUNT, LABELLED, GAUGE, SAMPLE, ARCHIVE = (
+    os.environ[f"RAIL_EXTRACT_{name}"] for name in ("RAW", "BLUNT", "LABELLED", "GAUGE", "SAMPLE", "ZIP")
 )
 PART = {
     "STANDARD": "IN_75R_1000",
@@ -70,9 +69,6 @@ FOLLOWING = {
     "measuretrackgeometry": "Measure the track geometry",
 }
 """Algorithms by the links that lead to them, from one single step to the next."""
-
-POOL_S = 35.0
-"""Time after which Qt has ended the thread of a run: 30 s without work, and some more."""
 
 
 class Browser(QObject):
@@ -570,7 +566,7 @@ def _follow(log: QTextEdit, text: str) -> None:
 
 
 def rails(driver: Driver) -> Iterator:
-    """Extract the sample's rails, wait, save them, and go on working with them."""
+    """Extract the sample's rails and load all results."""
     yield from install(ARCHIVE)
     dialog = yield from open_dialog("extractrails")
     dialog.mainWidget().wrappers["INPUT"].widget.combo.lineEdit().insert(SAMPLE)
@@ -581,24 +577,8 @@ def rails(driver: Driver) -> Iterator:
     results = dialog.results()
     driver.keep("results", results)
     yield from close(dialog)
-    layers = {layer.name(): layer for layer in QgsProject.instance().mapLayers().values()}
     driver.keep("layers", [node.name() for node in QgsProject.instance().layerTreeRoot().findLayers()])
     driver.picture("rails")
-    QgsProject.instance().write(str(driver.folder / "saved.qgs"))
-    yield POOL_S
-    driver.keep("systems", {name: layer.crs().toWkt() for name, layer in layers.items()})
-    driver.keep("project's system", QgsProject.instance().crs().toWkt())
-    driver.keep("new system", QgsCoordinateReferenceSystem("EPSG:32643").toWkt())
-    options = QgsVectorFileWriter.SaveVectorOptions()
-    saved = str(driver.folder / "saved.gpkg")
-    context = QgsProject.instance().transformContext()
-    QgsVectorFileWriter.writeAsVectorFormatV3(layers["Rails: sample"], saved, context, options)
-    driver.picture("rails_later")
-    dialog = yield from open_dialog("buildtrackcenterlines")
-    parameters = {"INPUT": layers["Rails: sample"].id(), "STANDARD": PART["STANDARD"]}
-    dialog.setParameters({**parameters, "OUTPUT": str(driver.folder / "tracks.gpkg")})
-    driver.keep("second log", (yield from press_run(dialog)))
-    yield from close(dialog)
 
 
 def review(driver: Driver) -> Iterator:
@@ -636,6 +616,41 @@ def review(driver: Driver) -> Iterator:
     driver.picture("review_rejected")
     driver.keep("order", [node.name() for node in QgsProject.instance().layerTreeRoot().findLayers()])
     yield from _show_in_3d(driver, menu)
+
+
+def clearance(driver: Driver) -> Iterator:
+    """Measure clearance from the dialog, and step through the intrusions in the dock."""
+    yield from install(ARCHIVE)
+    browser, project = Browser(), QgsProject.instance()
+    lines = f"{GAUGE}/lines.gpkg|layername="
+    dialog = yield from open_dialog("measureclearance")
+    given = {"INPUT": f"{lines}centerlines", "RAILS": f"{lines}rails", "POINTS": f"{GAUGE}/cloud.las"}
+    outputs = dict.fromkeys(("OUTPUT", "PLATFORMS", "REPORT"), "TEMPORARY_OUTPUT")
+    dialog.setParameters({**given, **outputs, "INTRUSIONS": str(driver.folder / "intrusions.gpkg"), "WIRES": None})
+    driver.picture("clearance_dialog")
+    driver.keep("log", (yield from press_run(dialog)))
+    yield from close(dialog)
+    driver.keep("opened", browser.urls)
+    layers = list(project.mapLayers().values())
+    driver.keep("layers", {layer.name(): layer.featureCount() for layer in layers})
+    found = next(layer for layer in layers if layer.fields().lookupField("pen_mm") >= 0)
+    driver.keep("depths", [one["pen_mm"] for one in found.getFeatures()])
+    dock = iface.mainWindow().findChild(QDockWidget, "RailExtractReview")
+    driver.keep("dock is visible", dock.isVisible())
+    yield lambda: not dock.is_reading
+    dock.go(0)
+    seen: dict[str, list] = {"counts": [], "reasons": [], "marks": [], "points": []}
+    for press in ("accepted", "next"):
+        yield 1.0
+        driver.picture(f"clearance_{press}")
+        seen["counts"].append(dock.count.text())
+        seen["reasons"].append(dock.reason.text())
+        seen["marks"].append(dock.view.picture.mark.tolist())
+        seen["points"].append(len(dock.view.picture.points))
+        dock.buttons[press].click()
+    for name, values in seen.items():
+        driver.keep(name, values)
+    driver.keep("decisions", [one["review"] for one in found.getFeatures()])
 
 
 def _show_in_3d(driver: Driver, menu: QMenu) -> Iterator:
@@ -843,8 +858,6 @@ def model(driver: Driver) -> Iterator:
     yield from close(designer)
     layers = QgsProject.instance().mapLayers().values()
     driver.keep("layers", sorted(layer.name() for layer in layers))
-    yield POOL_S
-    driver.keep("systems", {layer.name(): layer.crs().toWkt() for layer in layers})
 
 
 def _edit(designer, step: str) -> None:

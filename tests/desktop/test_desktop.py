@@ -9,6 +9,7 @@ from osgeo import gdal, ogr
 SCENARIOS = (
     *("dialogs", "unload", "raw", "missing", "rails", "welcome"),
     *("review", "reopened", "again", "tried", "onwards", "growing", "steps", "train", "batch", "model"),
+    "clearance",
 )
 
 DIES_AT_EXIT = ("rails", 340)
@@ -18,6 +19,7 @@ NAMES = [
     *("extractrails", "classifyrailpoints", "growrailpoints", "airbornecenterlines"),
     *("rasterizerailpoints", "frpdfcleanup", "vectorizerails"),
     *("buildtrackcenterlines", "measuretrackgeometry", "stationalongaxis", "fitalignment", "comparetracks"),
+    "measureclearance",
     *("exportalignment", "importalignment", "trainrailclassifier", "installpackages", "checkinstallation"),
 ]
 
@@ -37,7 +39,7 @@ def test_every_dialog_opens_and_its_help(run_scenario):
     assert unable in ([], ["trainrailclassifier"])  # it needs PyTorch, of which some Pythons have no build
     assert sorted([*session["dialogs"], *unable]) == sorted(NAMES)
     pages = [Path(address.replace("file://", "")).name for address in session["help"]]
-    own = {"airborne", "stationing", "alignment", "comparison", "alignment_files", "troubleshooting"}
+    own = {"airborne", "clearance", "stationing", "alignment", "comparison", "alignment_files", "troubleshooting"}
     assert {page.partition(".")[0] for page in pages} == {*own, "parameters"}
     assert len(pages) == len(NAMES) - len(unable)
 
@@ -181,22 +183,6 @@ def test_rails_are_found_and_loaded(run_scenario):
     assert session["layers"] == [*(f"{title}: sample" for title in titles), "cleaned"]
 
 
-def test_systems_outlive_the_thread_of_the_run(run_scenario):
-    session = run_scenario("rails")
-    systems = [*session["systems"].values(), session["project's system"], session["new system"]]
-    assert ["UTM zone 43N" in wkt for wkt in systems] == [True] * 7
-    assert ["UTM zone 43N" in wkt for wkt in run_scenario("model")["systems"].values()] == [True] * 3
-
-
-@pytest.mark.parametrize(("name", "count"), [("saved.gpkg", 6), ("tracks.gpkg", 3)])
-def test_saved_lines_are_complete(run_scenario, name, count):
-    dataset = ogr.Open(str(run_scenario("rails").folder / name))  # GDAL crashes if nothing refers to it
-    layer = dataset.GetLayer(0)
-    assert layer.GetSpatialRef().GetAuthorityCode(None) == "32643"
-    assert layer.GetFeatureCount() == count
-    assert layer.GetGeomType() == ogr.wkbLineString25D
-
-
 def test_saved_raster_has_its_system(run_scenario):
     dataset = gdal.Open(str(run_scenario("rails").folder / "cleaned.tif"))
     assert dataset.GetSpatialRef().GetAuthorityCode(None) == "32643"
@@ -229,6 +215,24 @@ def test_findings_are_reviewed_in_the_dock(run_scenario):
     decided = {feature["finding"]: feature["review"] for feature in layer}
     assert len(decided) == total
     assert (decided[1], decided[2], set(list(decided.values())[2:])) == ("accepted", "rejected", {""})
+
+
+def test_clearance_is_measured_and_intrusions_are_reviewed_in_the_dock(run_scenario):
+    session = run_scenario("clearance")
+    assert "INTRUSION_COUNT: 2" in session["log"].replace("'", "")
+    (opened,) = session["opened"]
+    assert opened.endswith(".html")
+    names = {name.partition(":")[0]: rows for name, rows in session["layers"].items()}
+    assert names == {"intrusions": 2, "Clearance": 90, "Platforms": 1}
+    assert session["dock is visible"]
+    assert session["depths"] == pytest.approx([80, 30], abs=4)
+    assert session["counts"] == ["1 of 2; 0 reviewed", "2 of 2; 1 reviewed"]
+    assert [reason.partition(" ")[2] for reason in session["reasons"]] == ["mm inside"] * 2
+    (in_curve, up), (on_straight, _) = session["marks"]
+    assert 1000 * on_straight == pytest.approx(-1615, abs=6)
+    assert 1000 * in_curve == pytest.approx(-1565 - 80 * up, abs=15)  # cant leans the profile, and the picture is level
+    assert min(session["points"]) > 100
+    assert session["decisions"] == ["accepted", ""]
 
 
 def test_a_3d_view_opens_on_the_lines(run_scenario):

@@ -224,6 +224,7 @@ OUTPUTS = {
     "vectorizerails": ("OUTPUT.gpkg",),
     "buildtrackcenterlines": ("OUTPUT.gpkg",),
     "measuretrackgeometry": ("OUTPUT.gpkg",),
+    "measureclearance": ("INTRUSIONS.gpkg", "OUTPUT.gpkg", "PLATFORMS.gpkg", "WIRES.gpkg", "REPORT.html"),
     "stationalongaxis": ("OUTPUT.gpkg",),
     "fitalignment": ("ELEMENTS.gpkg", "DEVIATIONS.gpkg"),
     "comparetracks": ("OUTPUT.gpkg", "REPORT.html"),

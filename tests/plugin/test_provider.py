@@ -1,7 +1,7 @@
 """What the toolbox offers."""
 
 GROUPS = {
-    "Rails and tracks": {"extractrails", "measuretrackgeometry"},
+    "Rails and tracks": {"extractrails", "measuretrackgeometry", "measureclearance"},
     "Alignment": {"stationalongaxis", "fitalignment", "comparetracks", "exportalignment", "importalignment"},
     "Raw clouds": {"classifyrailpoints", "growrailpoints", "airbornecenterlines", "trainrailclassifier"},
     "Single steps": {"rasterizerailpoints", "frpdfcleanup", "vectorizerails", "buildtrackcenterlines"},

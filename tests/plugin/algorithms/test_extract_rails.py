@@ -19,7 +19,6 @@ from qgis.core import (
 )
 from rail_extract.core.disk import PREFIX
 from rail_extract.core.kernels import blas
-from rail_extract.core.run import processes
 
 POINTS = f"{PREFIX}*/*/10_*"
 """Files with temporary points of class 10."""
@@ -192,22 +191,3 @@ def test_libraries_have_one_thread_during_a_run_and_as_many_as_before_afterwards
     finally:
         for one, threads in zip(blas(), before):
             one.set(threads)
-
-
-def test_worker_processes_give_the_same_lines(run, write_cloud, track, tmp_path, new_feedback, monkeypatch):
-    monkeypatch.setattr(processes, "WORTH_S", 0.0)
-    tiles = tmp_path / "täg les"
-    tiles.mkdir()
-    for number in range(3):
-        write_cloud(track() + [12.0 * number, 0, 0], f"{number}.las", folder=tiles)
-    found, said = [], []
-    for count in (1, 2):
-        feedback, rails = new_feedback(), tmp_path / f"{count}.gpkg"
-        assert run({"INPUT": tiles, "ITERATIONS": 1, "WORKERS": count, "RAILS": rails}, feedback).ok
-        found.append([(xyz.tolist(), items) for xyz, items in read_features(rails)])
-        said.append(feedback.infos)
-    assert len(found[0]) == 2
-    assert found[0] == found[1]
-    assert [text for text in said[1] if text.startswith("Up to 2 worker processes")] == [
-        text for text in said[1] if text not in said[0]
-    ]

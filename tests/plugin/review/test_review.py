@@ -8,7 +8,7 @@ from qgis.core import NULL, QgsCoordinateReferenceSystem, QgsFeature, QgsGeometr
 from qgis.gui import QgsMapCanvas
 from qgis.PyQt.QtCore import Qt
 from qgis.PyQt.QtWidgets import QMainWindow
-from rail_extract.core.fields import FINDING_FIELDS, RAIL_FIELDS
+from rail_extract.core.fields import CLEARANCE_FIELDS, FINDING_FIELDS, INTRUSION_FIELDS, RAIL_FIELDS
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.jobs.clouds import CloudSource
 from rail_extract.rail_extract_plugin.review.findings import ACCEPTED, REJECTED, reviews
@@ -297,3 +297,38 @@ def test_a_damaged_cloud_is_one_sentence(qgis, load, dock, cloud):
     wait(qgis, shown)
     assert "cloud.las" in shown._sections.note
     assert "Traceback" not in shown._sections.note
+
+
+def test_intrusions_are_stepped_through_with_the_cross_section_of_the_cloud(qgis, load, project, dock, write_cloud):
+    plate = np.array([[500_000 + x, 3_000_000 + 1.5, 100 + z] for x in (9.9, 10.0, 10.1) for z in (1.0, 2.0, 3.0)])
+    path = write_cloud(plate, class_code=1)
+    properties = {RUN: "this run", **properties_of(CloudSource((path,)), range(256), 0.07, ZERO)}
+    stations = [{"track_id": 1, "chainage_m": float(x), "lmar_mm": -145.0} for x in range(21)]
+    add_points(project, CLEARANCE_FIELDS, [(x, 0.0, 0.0, one) for x, one in enumerate(stations)], properties)
+    row = {"intrusion": 1, "track_id": 1, "from_m": 9.9, "to_m": 10.1, "chainage_m": 10.0, "pen_mm": 145.0, "sure": 1}
+    add_points(project, INTRUSION_FIELDS, [(10.0, 1.5, 2.0, {**row, "side": "left", "sigma_mm": 1.5})], properties)
+    shown = dock()
+    wait(qgis, shown)
+    assert shown.reason.text() == "145.0 mm inside"
+    assert shown.text.text() == ("Track 1, 9.9 to 10.1 m: standard error 1.5 mm, on the left. Cross-section at 10.0 m.")
+    picture = shown._sections.picture(shown._found[0])
+    assert len(picture.points) == len(plate)
+    assert picture.mark == pytest.approx([-1.5, 2.0], abs=1e-3)
+    shown.buttons["accepted"].click()
+    assert next(shown._layer.getFeatures())["review"] == "accepted"
+
+
+def add_points(project, columns, rows, properties):
+    """Add a layer of points along the track to the project."""
+    layer = QgsVectorLayer("PointZ?crs=EPSG:32643", "points", "memory")
+    layer.dataProvider().addAttributes(fields(columns).toList())
+    layer.updateFields()
+    for x, y, z, values in rows:
+        feature = QgsFeature(layer.fields())
+        feature.setGeometry(QgsGeometry.fromWkt(f"POINT Z ({500_000 + x} {3_000_000 + y} {100 + z})"))
+        for key, value in values.items():
+            feature[key] = value
+        assert layer.dataProvider().addFeature(feature)
+    for key, value in properties.items():
+        layer.setCustomProperty(key, value)
+    return project.addMapLayer(layer)

@@ -35,7 +35,9 @@ from rail_extract.rail_extract_plugin.writing.styling import style_on_load
 
 SHAPES = {
     **dict.fromkeys(("rails", "centerlines", "findings", "elements", "airborne", "places"), "LineStringZ"),
+    **dict.fromkeys(("platforms", "wires"), "LineStringZ"),
     **dict.fromkeys(("quality", "stops", "differences", "deviations", "stations"), "PointZ"),
+    **dict.fromkeys(("intrusions", "clearance"), "PointZ"),
     "axes": "LineStringZM",
 }
 COLUMNS = {product.style: product.fields for product in reversed(PRODUCTS)}
@@ -144,6 +146,14 @@ def test_findings_are_coloured_by_their_review(styled):
     assert colours(styled("findings", rows)) == ["#d62839", "#d62839", "#2e7d4f", "#787878"]
 
 
+def test_intrusions_are_redder_the_deeper_they_are(styled):
+    rows = [{"pen_mm": depth, "sure": sure, "what": what} for depth, sure, what in INTRUSIONS]
+    assert colours(styled("intrusions", rows)) == ["#9aa5b1", "#ffffff", "#fcbba1", "#fb6a4a", "#cb181d", "#67000d"]
+
+
+INTRUSIONS = [(900, 1, "platform"), (4, 0, ""), (8, 1, ""), (30, 1, ""), (90, 1, ""), (200, 1, "")]
+
+
 def test_elements_are_coloured_by_type_and_drawn_once(styled):
     types = ("line", "clothoid", "arc", "grade", "parabola", "constant", "ramp")
     found = colours(styled("elements", [{"type": one} for one in types]))
@@ -184,6 +194,14 @@ GRADE = {"layout": "V", "type": "grade", "grade1_pm": 2.5, "grade2_pm": 2.5, "le
         ("elements", ARC, ["Radius: -500.0 to -500.0"]),
         ("elements", CLOTHOID, ["straight to -500.0"]),
         ("elements", GRADE, ["Gradient: 2.50 to 2.50 ‰"]),
+        ("intrusions", {"intrusion": 2, "pen_mm": 12.34, "track_id": 1, "side": "left"}, ["2: 12.3 mm inside", "left"]),
+        (
+            "clearance",
+            {"track_id": 1, "chainage_m": 7.0, "lmar_mm": 120.0},
+            ["Track 1, 7.0 m", "left: 120 mm", "unknown"],
+        ),
+        ("platforms", {"platform": 3, "offset_mm": 1650.0}, ["Platform 3", "Offset: 1,650.0 mm"]),
+        ("wires", {"wire": 1, "height_mm": 5500.0}, ["Wire 1", "5,500.0 mm"]),
         ("axes", {"name": "Siding", "km_from": 12.5, "km_to": 13.0}, ["12.500 to 13.000"]),
     ],
 )

@@ -1,0 +1,173 @@
+"""Parts of objects inside a profile, as one section shows them; `intrusions` joins them across sections."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from scipy.ndimage import label
+from scipy.spatial import cKDTree
+
+from .frame import Course
+from .settings import Settings
+from .surface import ALONG_M, DEEPEST, Surface, surface_of
+from .vehicles import in_boxes
+from .wires import LIVE_M, away
+
+OTHER, PLATFORM, WIRE = range(3)
+"""What a point is of; parts are of one kind."""
+
+AROUND_M = 0.20
+"""Points up to this distance outside of the profile count for the surface of an object, so that its mean is not cut off
+at zero."""
+
+TOGETHER, TOGETHER_M = 4, 0.10
+"""This number of points within a distance makes a thing: dust, birds and rain are single points."""
+
+CELL_M = 0.2
+"""Cells of points inside that touch, with at most one cell between, are one object."""
+
+WINDOW_M = 0.5
+"""Side of the pieces of an object, along the track and in height, each of which gets a surface."""
+
+HOPELESS_SIGMAS = 8.0
+"""A piece whose third deepest point is this number of standard deviations of the noise less deep than that of the
+deepest piece is not the deepest one."""
+
+SEAM_M = 3 * CELL_M
+"""Length on both sides of the border of two sections in which both name the cells of their parts."""
+
+
+@dataclass(frozen=True)
+class Points:
+    """Points of a section in the order of s.
+
+    Attributes
+    ----------
+    place : (n, 3) array
+        s, v and w.
+    depth : (n,) array
+        Penetration of the profile, margin and widening included.
+    code, kind : (n,) int array
+        Class, and what they are of, see `OTHER`.
+    is_own : (n,) bool array
+        Whether a point is in the section itself, not in the halo.
+    number : (n,) int array
+        Points of the cloud that each stands for.
+    """
+
+    place: np.ndarray
+    depth: np.ndarray
+    code: np.ndarray
+    is_own: np.ndarray
+    kind: np.ndarray
+    number: np.ndarray
+
+    def kept(self, which: np.ndarray) -> Points:
+        """Return some of the points."""
+        return Points(*(column[which] for column in vars(self).values()))
+
+
+@dataclass(frozen=True)
+class Part:
+    """What a section shows of one object; lengths in metres.
+
+    Attributes
+    ----------
+    kind : int
+    low, high : (3,) array
+        Least and largest s, v and w of the points inside.
+    raw_m : float
+        Penetration of the deepest point.
+    codes, boxes : Counter
+        Points by class; and in the spaces of vehicles, see `vehicles.in_boxes`.
+    is_live : bool
+        Whether a point is so near to the contact wire that the object is live itself.
+    surfaces : tuple of Surface
+    seam : frozenset
+        Kind and numbers of the cells by which the object continues in another section.
+    """
+
+    kind: int
+    low: np.ndarray
+    high: np.ndarray
+    raw_m: float
+    codes: Counter[int]
+    boxes: Counter[int]
+    is_live: bool
+    surfaces: tuple[Surface, ...]
+    seam: frozenset[tuple[int, ...]]
+
+
+def parts_of(
+    points: Points, nodes: np.ndarray, courses: Sequence[Course], ends: tuple[float, float], settings: Settings
+) -> list[Part]:
+    """Return the parts of objects in a section, which ends at two chainages.
+
+    Given are the places of the wire, the track, and those around it.
+    """
+    near = points.kept(points.depth > -AROUND_M)
+    inside = np.flatnonzero(near.depth > 0)
+    if not len(inside):
+        return []
+    reach, _ = cKDTree(near.place).query(near.place[inside], k=[TOGETHER], distance_upper_bound=TOGETHER_M)
+    inside = inside[np.isfinite(reach[:, 0])]
+    found = []
+    for kind in np.unique(near.kind[inside]).tolist():
+        mine = inside[near.kind[inside] == kind]
+        cells = np.floor(near.place[mine] / CELL_M).astype(np.int64)
+        labels = labelled(cells)
+        at_seam = np.abs(near.place[mine, :1] - ends).min(axis=1) <= SEAM_M
+        for one in np.unique(labels[near.is_own[mine]]).tolist():
+            seam = frozenset((kind, *cell) for cell in cells[at_seam & (labels == one)].tolist())
+            own = mine[(labels == one) & near.is_own[mine]]
+            found.append(_part(near, own, kind, seam, nodes, courses, settings))
+    return found
+
+
+def labelled(cells: np.ndarray) -> np.ndarray:
+    """Return the number of the object of each cell, (n, 3) int: those at most one cell apart are one."""
+    low = cells.min(axis=0)
+    grid = np.zeros(cells.max(axis=0) - low + 2, dtype=bool)
+    for corner in np.ndindex(2, 2, 2):  # doubled cells touch where one cell is between
+        grid[tuple((cells - low + corner).T)] = True
+    found, _ = label(grid, np.ones((3, 3, 3)))
+    return found[tuple((cells - low).T)]
+
+
+def _part(
+    near: Points,
+    own: np.ndarray,
+    kind: int,
+    seam: frozenset[tuple[int, ...]],
+    nodes: np.ndarray,
+    courses: Sequence[Course],
+    settings: Settings,
+) -> Part:
+    """Return the part that some points inside make."""
+    place, codes = near.place[own], Counter[int]()
+    for code in np.unique(near.code[own]).tolist():
+        codes[code] = int(near.number[own][near.code[own] == code].sum())
+    is_live = bool(away(nodes, place).min() <= LIVE_M)
+    surfaces = tuple(_surfaces(near, own, courses[0], settings))
+    box = in_boxes(place, courses)
+    raw_m = float(near.depth[own].max())
+    return Part(kind, place.min(axis=0), place.max(axis=0), raw_m, codes, box, is_live, surfaces, seam)
+
+
+def _surfaces(near: Points, own: np.ndarray, course: Course, settings: Settings) -> Iterator[Surface]:
+    """Yield the surfaces of the pieces of a part that may be its deepest."""
+    window = np.floor(near.place[own][:, [0, 2]] / WINDOW_M).astype(np.int64)
+    order = np.lexsort((-near.depth[own], window[:, 1], window[:, 0]))
+    borders = np.flatnonzero((np.diff(window[order], axis=0) != 0).any(axis=1)) + 1
+    pieces = [own[some] for some in np.split(order, borders)]
+    third = np.array([near.depth[some[min(2, len(some) - 1)]] for some in pieces])
+    for some in (pieces[at] for at in np.flatnonzero(third >= third.max() - HOPELESS_SIGMAS * course.noise_m)):
+        centre = np.median(near.place[some[:DEEPEST]], axis=0)
+        i, j = np.searchsorted(near.place[:, 0], (centre[0] - ALONG_M, centre[0] + ALONG_M))
+        inward = settings.outline.inward(centre[1:])
+        depth_at = partial(settings.depth, course)
+        yield surface_of(near.place[i:j], near.depth[i:j], centre, inward, course.noise_m, depth_at)

@@ -1,0 +1,132 @@
+"""What the points of one section of a track show: its stations, its platforms and wires, and parts of objects."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..run.tasks import Context
+from ..tiles.store import read_stored
+from .frame import Course
+from .parts import OTHER, PLATFORM, WIRE, Part, Points, parts_of
+from .platforms import edges_of, on_platforms, platforms_of
+from .settings import Settings
+from .sweep import HALO_M, POINT, SECTION_M
+from .vehicles import own_vehicle
+from .wires import LIVE_M, away, nodes_of
+
+BANDS_M = (0.380, 1.170, 3.250, 4.310, 7.000)
+"""Upper ends of the height bands: feet of profiles and platforms, bodies, upper corners, roofs, pantographs."""
+
+THIRD = 3
+"""The third nearest point of a station and band counts: one or two stray points do not."""
+
+MOST_POINTS = 2_000_000
+"""Points of a section above which only the deepest of each cell of a centimetre is kept, with their number."""
+
+FINE_M = 0.01
+"""Side of these cells: a surface that is fitted has hundreds of them."""
+
+Least = tuple[np.ndarray, np.ndarray]
+"""Numbers of cells and the `THIRD` least values in each, rising. A cell is a station, side and band: ten times the
+station, plus the band, plus five on the right."""
+
+
+@dataclass(frozen=True)
+class Section:
+    """What a section shows: least distances from the middle and margins, metres, and parts of objects.
+
+    `edges` and `nodes` are rows of `platforms.edges_of` and of `wires.nodes_of`; `vehicle`, (k, 2), are v and w of the
+    cells that the vehicle of the scanner fills.
+    """
+
+    aside: Least
+    margin: Least
+    edges: np.ndarray
+    nodes: np.ndarray
+    parts: list[Part]
+    vehicle: np.ndarray
+
+
+def measure_section(
+    courses: Sequence[Course], section: int, files: Sequence[Sequence[str]], settings: Settings, context: Context
+) -> Section:
+    """Measure a section; a task.
+
+    Given are the track and those around it, and the files of the section before, the section, and the one after it.
+    """
+    course, ends = courses[0], (section * SECTION_M, (section + 1) * SECTION_M)
+    points = read_points(course, section, files, settings)
+    context.progress.check()
+    is_vehicle, vehicle = own_vehicle(points.place)
+    points = points.kept(~is_vehicle)
+    s, v, w = points.place.T
+    nodes = nodes_of(points.place, course)
+    context.progress.check()
+    edges = edges_of(s, v, w)
+    context.progress.check()
+    points.kind[on_platforms(platforms_of(0, edges), s, v, w)] = PLATFORM
+    points.kind[away(nodes, points.place) <= LIVE_M / 2] = WIRE
+    parts = parts_of(points, nodes, courses, ends, settings)
+    edges, nodes = (one[(one[:, 0] >= ends[0]) & (one[:, 0] < ends[1])] for one in (edges, nodes))
+    return Section(
+        *least_of(points.kept(points.is_own & (points.kind != WIRE)), settings), edges, nodes, parts, vehicle
+    )
+
+
+def read_points(course: Course, section: int, files: Sequence[Sequence[str]], settings: Settings) -> Points:
+    """Read the points of a section with its halo, in an order that does not depend on the files."""
+    columns = []
+    for off, own in zip((-1, 0, 1), files):
+        stored = read_stored(own, POINT)
+        s = stored["s"].astype(float) + off * SECTION_M
+        near = (s >= -HALO_M) & (s < SECTION_M + HALO_M)
+        is_own = np.full(int(near.sum()), off == 0)
+        columns.append((s[near] + section * SECTION_M, *(stored[name][near] for name in ("v", "w", "code")), is_own))
+    s, v, w, code, is_own = (np.concatenate(column) for column in zip(*columns))
+    order = np.lexsort((code, w, v, s))
+    place = np.column_stack([s, v.astype(float), w.astype(float)])[order]
+    depth, nothing = settings.depth(course, place), np.full(len(s), OTHER, dtype=np.int8)
+    points = Points(place, depth, code[order], is_own[order], nothing, np.ones(len(s), dtype=np.int64))
+    return points if len(s) <= MOST_POINTS else _thinned(points)
+
+
+def _thinned(points: Points) -> Points:
+    """Return the deepest point of each fine cell, with the number of points that it stands for."""
+    cell = np.floor(points.place / FINE_M).astype(np.int64)
+    cell -= cell.min(axis=0)
+    order = np.argsort(-points.depth, kind="stable")
+    number = np.ravel_multi_index(tuple(cell[order].T), tuple(cell.max(axis=0) + 1))
+    _, first, count = np.unique(number, return_index=True, return_counts=True)
+    rank = np.argsort(order[first])
+    return replace(points.kept(order[first][rank]), number=count[rank])
+
+
+def least_of(points: Points, settings: Settings) -> tuple[Least, Least]:
+    """Return the least distances and margins of each station, side and band."""
+    s, v, w = points.place.T
+    band = np.searchsorted(BANDS_M, w)
+    counts = (w >= settings.outline.floor_m) & (band < len(BANDS_M))
+    cell = 2 * len(BANDS_M) * np.rint(s / settings.step_m).astype(np.int64) + len(BANDS_M) * (v < 0) + band
+    return least_three(cell[counts], np.abs(v[counts])), least_three(cell[counts], -points.depth[counts])
+
+
+def least_three(cell: np.ndarray, value: np.ndarray) -> Least:
+    """Return the least values of each cell."""
+    order = np.lexsort((value, cell))
+    cell, value = cell[order], value[order]
+    kept = np.append(np.ones(min(len(cell), THIRD), dtype=bool), cell[THIRD:] != cell[:-THIRD])
+    return cell[kept], value[kept]
+
+
+def third_least(parts: Sequence[Least], size: int) -> np.ndarray:
+    """Return the third least values of cells, (size,), NaN where there are fewer, given the least ones of sections."""
+    found = np.full(size, np.nan)
+    if parts:
+        cell, value = least_three(*(np.concatenate(column) for column in zip(*parts)))
+        at = np.flatnonzero(cell[THIRD - 1 :] == cell[: len(cell) - THIRD + 1]) + THIRD - 1
+        at = at[cell[at] < size]
+        found[cell[at]] = np.where(np.isfinite(value[at]), value[at], np.nan)
+    return found

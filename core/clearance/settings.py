@@ -1,0 +1,74 @@
+"""What is measured: the profile, and how it is swept."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from .frame import Course
+from .outline import Outline
+from .profiles import Profile
+
+MARK, LEAVE_OUT = TRAINS = ("MARK", "LEAVE_OUT")
+"""Choices of TRAINS: name vehicles on tracks, or omit them."""
+
+BESIDE_M, LEAST_REACH_M = 1.6, 3.0
+"""Points this far beyond the half width of the profile and its margin are kept, so that stations have distances; and
+the least reach, up to which platforms are looked for."""
+
+LOWEST_M, BELOW_M = 0.12, 0.05
+"""Height at which platform edges begin, even where the lowest height that counts is above; and how far below points
+are kept, as the rough height of a point is off by that."""
+
+EBO_DISTANCE_M = 4.0
+"""Least distance of tracks on the open line (EBO section 10)."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What is measured.
+
+    `widening` is one of `widening.RULES`, `trains` of `TRAINS`. `distance_m` is the least distance of tracks, None for
+    that of the profile's rules. Classes `left_out` count nowhere.
+    """
+
+    profile: Profile
+    margin_m: float = 0.0
+    floor_m: float = 0.08
+    step_m: float = 1.0
+    widening: str = "NONE"
+    distance_m: float | None = None
+    left_out: tuple[int, ...] = ()
+    trains: str = MARK
+
+    @property
+    def least_distance_m(self) -> float:
+        """Least distance of tracks; NaN where nothing is judged."""
+        if self.distance_m is not None:
+            return self.distance_m
+        return EBO_DISTANCE_M if self.profile.is_of_ebo else np.nan
+
+    @property
+    def reach_m(self) -> float:
+        """How far aside of the track points are kept."""
+        return max(self.profile.half_width_m + self.margin_m + BESIDE_M, LEAST_REACH_M)
+
+    @property
+    def lowest_m(self) -> float:
+        """Height from which points are kept."""
+        return min(self.floor_m, LOWEST_M) - BELOW_M
+
+    @cached_property
+    def outline(self) -> Outline:
+        """The boundary of the profile."""
+        return Outline(self.profile, self.floor_m)
+
+    def depth(self, course: Course, place: np.ndarray) -> np.ndarray:
+        """Return the penetration of places, (n, 3) in the frame of a track, with its widening and the margin."""
+        s, v, w = place.T
+        left, right = course.at(s, course.wide_m).T
+        narrowed = np.sign(v) * np.maximum(np.abs(v) - np.where(v > 0, left, right), 0.0)
+        depth = self.outline.distance(np.column_stack([narrowed, w])) + self.margin_m
+        return np.where(w >= self.outline.floor_m, depth, -np.inf)

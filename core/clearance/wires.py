@@ -1,0 +1,222 @@
+"""The contact wire over a track: its height and its stagger, every half metre."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..polyline import interpolate
+from .along import known_at, pieces
+from .frame import Course
+
+ASIDE_M, HEIGHT_M = 1.1, (4.4, 7.0)
+"""Where a contact wire is: beyond, no pantograph reaches it."""
+
+BIN_M = 0.5
+"""Length of the pieces in which a wire is looked for: at 400 points per square metre, two or three points of it."""
+
+GROUPS, THICK_M, WIDE_M, LEAST_POINTS = 4, 0.04, 0.06, 2
+"""Groups of points that may be a wire, from below, in each piece: their largest number, thickness and width, and least
+number of points."""
+
+BESIDE_M, BESIDE_UP_M = (0.08, 0.40), 0.06
+"""Aside and in height: where there are no more points than in a group. A wire is thin: roofs, beams and leaves are
+none."""
+
+TRIES = 12
+"""Places at which a group is looked for in a piece; a roof has points at every height."""
+
+HEIGHT_COST, POINT_GAIN, POINTS_GAIN, NONE_COST = 0.3, 0.15, 6, 0.8
+"""Cost of a metre of height, gain of each of the first points, their number, and cost of a piece without a wire: the
+lowest thing that goes on is the contact wire, not the messenger, a dropper or an arm."""
+
+TURN_M, RISE_M, CHANGE_CAP, ENTER_COST = 0.03, 0.02, 12.0, 3.0
+"""Change across and in height that costs 1, the largest such cost, and the cost of a gap on either side."""
+
+NEAR_M = 0.05, 0.035
+"""Points within these distances of the chain, across and in height, are of the wire."""
+
+WINDOWS_M = ((-1.5, 1.5), (-2.2, 0.0), (0.0, 2.2))
+"""Parts around a place over which the wire is straight: the steadiest counts, so that a kink at a support stays."""
+
+STEADY = 1.2
+"""The first of these parts counts whose points scatter at most this number of times as much as those of the
+steadiest."""
+
+LEAST_FITTED = 6
+"""Points that a straight piece needs."""
+
+ACCEPTED_SIGMAS = 3.0
+"""A point further off a straight piece, in standard deviations, is of an arm or a clamp."""
+
+JUMP_M = 0.10, 0.06
+"""Change across and in height between pieces at which a wire breaks: ten times that of the steepest one."""
+
+LONGEST_GAP_M, SHORTEST_M = 8.0, 10.0
+"""A longer gap parts wires; shorter wires are none."""
+
+GRADE_M = 20.0
+"""Length over which the gradient is measured."""
+
+LIVE_M = 0.15
+"""What is so near to the wire is live itself: clamps and arms. Insulation keeps all else further away."""
+
+ARMS_M = 4.6
+"""Arms are above this height."""
+
+
+@dataclass(frozen=True)
+class Wire:
+    """A contact wire over a track: s, v, w and the standard error of places, (n,) each."""
+
+    course: int
+    s: np.ndarray
+    v: np.ndarray
+    w: np.ndarray
+    sigma_m: np.ndarray
+
+    @property
+    def length_m(self) -> float:
+        """Length along the track."""
+        return float(self.s[-1] - self.s[0])
+
+    @property
+    def grade_pm(self) -> float:
+        """Steepest gradient against the track over 20 m, per mille; NaN for a shorter wire."""
+        known = self.s + GRADE_M <= self.s[-1]
+        rise = np.abs(np.interp(self.s + GRADE_M, self.s, self.w) - self.w)[known]
+        return float(rise.max() / GRADE_M * 1000) if known.any() else np.nan
+
+
+def nodes_of(place: np.ndarray, course: Course) -> np.ndarray:
+    """Return the places of the contact wire over a track in points, (n, 3): s, v, w and standard errors, (k, 4)."""
+    _, v, w = place.T
+    points = place[(np.abs(v) < ASIDE_M) & (w > HEIGHT_M[0]) & (w < HEIGHT_M[1])]
+    bins, groups = _groups(*points.T)
+    chain = _chain(groups)
+    there = np.flatnonzero(chain >= 0)
+    if len(there) < LEAST_FITTED:
+        return np.empty((0, 4))
+    at = (bins[there] + 0.5) * BIN_M
+    way = np.array([groups[i][chain[i]][:2] for i in there])
+    points = points[(np.abs(points[:, 1:] - interpolate(way, at, points[:, 0])) <= NEAR_M).all(axis=1)]
+    points = points[np.argsort(points[:, 0], kind="stable")]
+    curvature = course.at(at, course.curvature)
+    refined = (_refined(points, *one) for one in zip(at.tolist(), curvature.tolist()))
+    return np.reshape([row for row in refined if row is not None], (-1, 4))
+
+
+def _groups(s: np.ndarray, v: np.ndarray, w: np.ndarray) -> tuple[np.ndarray, list[np.ndarray]]:
+    """Return the numbers of the pieces, and v, w and number of points of the groups in each, (k, 3)."""
+    if not len(s):
+        return np.empty(0, dtype=np.int64), []
+    number = np.floor(s / BIN_M).astype(np.int64)
+    bins = np.arange(number.min(), number.max() + 1)
+    order = np.lexsort((w, number))
+    borders = np.searchsorted(number[order], np.append(bins, bins[-1] + 1))
+    return bins, [_from_below(v[order[i:j]], w[order[i:j]]) for i, j in zip(borders, borders[1:])]
+
+
+def _from_below(v: np.ndarray, w: np.ndarray) -> np.ndarray:
+    """Return the groups in a piece, (k, 3), given points in the order of their heights."""
+    found: list[tuple[float, float, int]] = []
+    used = np.zeros(len(w), dtype=bool)
+    for _ in range(TRIES):
+        free = np.flatnonzero(~used)
+        if not len(free) or len(found) == GROUPS:
+            break
+        lowest = free[0]
+        high = w <= w[lowest] + THICK_M
+        mine = ~used & high & (np.abs(v - v[lowest]) <= WIDE_M / 2)
+        middle = float(np.median(v[mine])), float(np.median(w[mine]))
+        aside = np.abs(v - middle[0])
+        beside = (aside > BESIDE_M[0]) & (aside < BESIDE_M[1]) & (np.abs(w - middle[1]) < BESIDE_UP_M)
+        if mine.sum() >= LEAST_POINTS and beside.sum() <= mine.sum():
+            found.append((*middle, int(mine.sum())))
+        used |= mine
+    return np.reshape(found, (-1, 3))
+
+
+def _chain(groups: Sequence[np.ndarray]) -> np.ndarray:
+    """Return the number of the group of the wire in each piece, -1 where there is none: the cheapest way (Viterbi)."""
+    costs, back = np.zeros(1), []
+    before = np.empty((0, 3))
+    for own in groups:
+        gain = HEIGHT_COST * (own[:, 1] - HEIGHT_M[0]) - POINT_GAIN * np.minimum(own[:, 2], POINTS_GAIN)
+        change = np.full((len(before) + 1, len(own) + 1), ENTER_COST)
+        change[-1, -1] = 0.0
+        turn = (
+            np.abs(before[:, None, 0] - own[None, :, 0]) / TURN_M
+            + np.abs(before[:, None, 1] - own[None, :, 1]) / RISE_M
+        )
+        change[:-1, :-1] = np.minimum(turn, CHANGE_CAP)
+        total = costs[:, None] + change
+        back.append(np.argmin(total, axis=0))
+        costs = total.min(axis=0) + np.append(gain, NONE_COST)
+        before = own
+    chain = np.full(len(groups), -1)
+    state = int(np.argmin(costs))
+    for at in range(len(groups) - 1, -1, -1):
+        chain[at] = state if state < len(groups[at]) else -1
+        state = int(back[at][state])
+    return chain
+
+
+def _refined(points: np.ndarray, s: float, curvature: float) -> tuple[float, float, float, float] | None:
+    """Return s, v, w and the standard error of the wire at a place; None where too few points tell it.
+
+    The wire is straight where the track bends: in the frame of the track it is a parabola of the known curvature.
+    """
+    fits = []
+    for low, high in WINDOWS_M:
+        i, j = np.searchsorted(points[:, 0], (s + low, s + high))
+        one = _straight(points[i:j, 0] - s, points[i:j, 1:], curvature)
+        fits += [one] if one is not None else []
+    if not fits:
+        return None
+    least = STEADY * min(scatter for *_, scatter in fits)
+    v, w, sigma, _ = next(one for one in fits if one[-1] <= least)
+    return s, v, w, sigma
+
+
+def _straight(ahead: np.ndarray, vw: np.ndarray, curvature: float) -> tuple[float, float, float, float] | None:
+    """Fit a straight piece; returns v and w at its origin, their standard error, and the scatter of the points."""
+    values = vw + np.column_stack([0.5 * curvature * ahead**2, np.zeros(len(ahead))])
+    kept = np.ones(len(ahead), dtype=bool)
+    for _ in range(3):
+        if kept.sum() < LEAST_FITTED or np.ptp(ahead[kept]) < 0.5:
+            return None
+        design = np.column_stack([np.ones(int(kept.sum())), ahead[kept]])
+        fit, *_ = np.linalg.lstsq(design, values[kept], rcond=None)
+        off = np.abs(values - fit[0] - ahead[:, None] * fit[1])
+        scatter = np.sqrt(np.mean(off[kept] ** 2, axis=0))
+        kept = (off <= ACCEPTED_SIGMAS * np.maximum(scatter, 0.003)).all(axis=1)
+    spread = np.linalg.inv(design.T @ design)[0, 0]
+    both = float(np.hypot(*scatter))
+    return float(fit[0, 0]), float(fit[0, 1]), both * float(np.sqrt(spread)), both
+
+
+def wires_of(course: int, nodes: np.ndarray) -> Iterator[Wire]:
+    """Yield the wires over a track, given places in order: they part where these jump, and at long gaps."""
+    for part in pieces(nodes[:, 0], nodes[:, 1:3], JUMP_M, LONGEST_GAP_M):
+        if nodes[part[-1], 0] - nodes[part[0], 0] >= SHORTEST_M:
+            yield Wire(course, *nodes[part].T)
+
+
+def away(nodes: np.ndarray, place: np.ndarray) -> np.ndarray:
+    """Return the distance of points, (n, 3), from the places of a wire, (k, 4); inf where there is none."""
+    off = place[:, 1:] - known_at(place[:, 0], nodes[:, 0], nodes[:, 1:3], LONGEST_GAP_M / 2)
+    return np.nan_to_num(np.hypot(*off.T), nan=np.inf)
+
+
+def wire_at(wires: Sequence[Wire], course: int, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return height and stagger of the contact wire at chainages, (n,) each, NaN without one."""
+    found = np.full((len(s), 2), np.nan)
+    for one in wires:
+        if one.course == course:
+            here = known_at(s, one.s, np.column_stack([one.w, one.v]), 2 * BIN_M)
+            found = np.where(np.isfinite(here), here, found)
+    height, stagger = found.T
+    return height, stagger

@@ -1,0 +1,259 @@
+"""The page about the clearance along tracks: verdict, diagrams, the worst cross-sections, and tables."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+
+from ..clearance.intrusions import Intrusion
+from ..clearance.measure import Clearance, Stations
+from ..clearance.platforms import edge_at
+from ..clearance.wires import wire_at
+from ..polyline import runs
+from ..progress import counted, metres, written
+from .clearance_pictures import RULES, cross_section, diagram
+from .clearance_remarks import cannot_be_judged
+from .clearance_slices import Slice
+from .markup import figure, made, note, page, section, table, tag, tiles, verdict_box
+from .page import stated
+from .plots import Curve, Panel, broken, draw_panels
+
+NOTES = (
+    "This is a screening and no proof of conformity. The standard error holds the fit of the object's surface, the "
+    "error of the centerline, and that of the cant times the height. Registration between passes, often 5 to 20 mm, is "
+    "not in it.",
+    "Penetration is that of the object's surface, not of its deepest point, which is noise. Margins of stations are "
+    "those of the third nearest point. Rails, bed, single stray points, and the vehicle of the scanner do not "
+    "count; contact wires, platforms and trains are named and do not count.",
+    "Distances and heights are in the plane of both rail tops, from the middle of the track. The overhang of vehicles "
+    "beyond the ends of lines is not swept.",
+)
+
+WIRE_LIMITS = (
+    "Heights of contact wires to compare with: 5000 to 5750 mm nominal, 5080 to 5300 mm from 250 km/h, at most 6500 mm "
+    "(Regulation (EU) 1301/2014, table 4.2.9.1); at least 4950 mm at 15 kV and 5020 mm at 25 kV (EBO annex 3)."
+)
+
+LEAST_SPAN_MM = 20.0
+"""Smallest range of a panel, so that noise does not look alarming."""
+
+
+def clearance_page(found: Clearance, worst: Sequence[Slice], source: str, facts: Mapping[str, str]) -> str:
+    """Return the page, a complete HTML document.
+
+    Given are the points around the worst places, the name of the cloud, and further facts to state, by name.
+    """
+    kind, words = verdict(found)
+    return page(
+        f"Clearance: {source}",
+        "Clearance",
+        source,
+        verdict_box(kind, words, found.warnings),
+        _tiles(found),
+        *(diagram(found, number) for number in range(len(found.courses))),
+        *_cross_sections(found, worst),
+        *_intrusions(found),
+        *_distances(found),
+        *_platforms(found),
+        *_wires(found),
+        made({**stated(found.frame.crs_wkt), **_facts(found), **facts}, NOTES),
+        style=RULES,
+    )
+
+
+def verdict(found: Clearance) -> tuple[str, str]:
+    """Return the CSS class and the words of the verdict."""
+    reasons = cannot_be_judged(found)
+    sure = found.sure
+    if sure:
+        worst = max(sure, key=lambda one: one.pen_mm)
+        places = counted(len(sure), "place")
+        words = f"{places} inside the profile, the worst {written(worst.pen_mm, '.0f')} mm {_where(worst)}."
+        return "poor", f"{words} The rest cannot be judged." if reasons else words
+    if reasons:
+        return "poor", "Cannot be judged."
+    doubtful = [one for one in found.intrusions if not one.what]
+    least = figure(1000 * found.least_margin_m, ".0f")
+    if doubtful:
+        return "fair", f"Free, with {counted(len(doubtful), 'place')} in doubt. The least margin is {least}."
+    return "good", f"Free. The least margin is {least}."
+
+
+def _where(one: Intrusion) -> str:
+    """Return the place of an intrusion in words."""
+    place = f"at km {one.km_text}" if one.km_text else f"at {one.chainage_m:,.1f} m of track {one.track_id}"
+    return f"{place} on the {one.side}"
+
+
+def summary(found: Clearance) -> list[str]:
+    """Return the verdict and what it rests on, in sentences for a log."""
+    length_m = sum(one.length_m for one in found.courses)
+    return [
+        verdict(found)[1],
+        f"{counted(len(found.courses), 'track')} ({metres(length_m)}), profile {found.settings.profile.name}: "
+        f"{counted(found.point_count, 'point')} within reach, {counted(len(found.platforms), 'platform edge')}, "
+        f"{metres(sum(one.length_m for one in found.wires))} of contact wire.",
+    ]
+
+
+def _facts(found: Clearance) -> dict[str, str]:
+    settings = found.settings
+    return {
+        "Profile": f"{settings.profile.name} ({settings.profile.source})",
+        "MARGIN": f"{1000 * settings.margin_m:g} mm",
+        "WIDENING": settings.widening,
+        "FLOOR": f"{1000 * settings.floor_m:g} mm",
+        "Classes left out": ", ".join(map(str, settings.left_out)) or "none",
+    }
+
+
+def _tiles(found: Clearance) -> str:
+    doubtful = sum(not one.what and not one.sure for one in found.intrusions)
+    figures = (
+        (str(len(found.sure)), "surely inside"),
+        (str(doubtful), "in doubt"),
+        (figure(1000 * found.least_margin_m, ".0f"), "least margin"),
+        (str(len(found.platforms)), "platform edges"),
+        (metres(sum(one.length_m for one in found.wires)), "of contact wire"),
+        (metres(sum(one.length_m for one in found.courses)), "of track"),
+    )
+    return tiles(figures)
+
+
+def _cross_sections(found: Clearance, worst: Sequence[Slice]) -> Iterator[str]:
+    if worst:
+        drawn = (cross_section(found, one) for one in worst)
+        yield section("Worst cross-sections", tag("div", *drawn, class_="crosses"))
+
+
+def _intrusions(found: Clearance) -> Iterator[str]:
+    if not found.intrusions:
+        return
+    headings = (
+        "No.",
+        "Track",
+        "Place",
+        "Side",
+        "Inside",
+        "Standard error",
+        "Height",
+        "From",
+        "To",
+        "Points",
+        "Class",
+        "Sure",
+        "What",
+    )
+    rows = [
+        (
+            one.intrusion,
+            one.track_id,
+            one.km_text or f"{one.chainage_m:,.1f} m",
+            one.side,
+            figure(one.pen_mm),
+            figure(one.sigma_mm),
+            figure(one.w_mm, ".0f"),
+            f"{one.from_m:,.1f} m",
+            f"{one.to_m:,.1f} m",
+            f"{one.points:,}",
+            one.class_code,
+            "yes" if one.sure else "in doubt",
+            one.what,
+        )
+        for one in found.intrusions
+    ]
+    yield section("Inside the profile", table(headings, rows, "scroll tall"))
+
+
+def _distances(found: Clearance) -> Iterator[str]:
+    """List where tracks are nearer than required, and where they join."""
+    rows = [row for one in found.stations for row in _short(found, one)]
+    if rows:
+        headings = ("Track", "Neighbour", "From", "To", "Least distance", "Required", "What")
+        yield section("Distance between tracks", table(headings, rows, "scroll tall"))
+
+
+def _short(found: Clearance, stations: Stations) -> Iterator[Sequence[object]]:
+    for side in (stations.left, stations.right):
+        for first, last in runs(side.short):
+            at = first + int(np.argmin(side.distance_m[first : last + 1]))
+            yield (
+                stations.course.track_id,
+                found.courses[side.track[at]].track_id,
+                f"{stations.s[first]:,.1f} m",
+                f"{stations.s[last]:,.1f} m",
+                f"{side.distance_m[at]:.3f} m",
+                f"{side.least_m[at]:.3f} m",
+                "too near",
+            )
+        for at in side.fouling:
+            place = f"{stations.s[at]:,.1f} m"
+            other = found.courses[side.track[at]].track_id
+            yield (stations.course.track_id, other, place, place, f"{side.distance_m[at]:.3f} m", "", "fouling point")
+
+
+def _platforms(found: Clearance) -> Iterator[str]:
+    if not found.platforms:
+        return
+    headings = ("Track", "Side", "From", "To", "Offset", "least", "largest", "Height", "least", "largest", "Nominal")
+    rows = [
+        (
+            found.courses[one.course].track_id,
+            "left" if one.side > 0 else "right",
+            f"{one.s[0] - 0.5:,.1f} m",
+            f"{one.s[-1] + 0.5:,.1f} m",
+            *(figure(1000 * float(pick(values))) for values in (one.offset_m, one.height_m) for pick in PICKS),
+            one.nominal_mm or "",
+        )
+        for one in found.platforms
+    ]
+    drawn = (_drawn(found, at) for at in _with(found.platforms))
+    yield section("Platform edges", table(headings, rows), *drawn)
+
+
+PICKS = (np.mean, np.min, np.max)
+
+
+def _with(things: Sequence) -> list[int]:
+    """Return the numbers of the tracks that have things."""
+    return sorted({one.course for one in things})
+
+
+def _drawn(found: Clearance, number: int) -> str:
+    """Draw offset and height of the platform edges of a track."""
+    course, panels = found.courses[number], []
+    s = np.arange(0.0, course.length_m, 1.0)
+    for side, name in ((1, "Platform on the left"), (-1, "Platform on the right")):
+        for what, values in zip(("offset", "height"), edge_at(found.platforms, number, side, s)):
+            if np.isfinite(values).any():
+                panels.append(Panel(f"{name}: {what}", "[mm]", [Curve(s, 1000 * values)], LEAST_SPAN_MM))
+    return draw_panels(f"Platforms of track {course.track_id}", panels, (0.0, course.length_m), "chainage [m]")
+
+
+def _wires(found: Clearance) -> Iterator[str]:
+    if not found.wires:
+        return
+    headings = ("Track", "From", "To", "Height", "least", "largest", "Stagger, least", "largest", "Steepest gradient")
+    rows = [
+        (
+            found.courses[one.course].track_id,
+            f"{one.s[0]:,.1f} m",
+            f"{one.s[-1]:,.1f} m",
+            *(figure(1000 * float(pick(one.w))) for pick in PICKS),
+            *(figure(1000 * float(pick(one.v))) for pick in PICKS[1:]),
+            figure(one.grade_pm, ".1f", "‰"),
+        )
+        for one in found.wires
+    ]
+    drawn = []
+    for number in _with(found.wires):
+        course = found.courses[number]
+        s = np.arange(0.0, course.length_m, 0.5)
+        height, stagger = wire_at(found.wires, number, s)
+        panels = [
+            Panel(name, "[mm]", [Curve(*broken(s, 1000 * values, 1.0))], LEAST_SPAN_MM)
+            for name, values in (("Height", height), ("Stagger, positive to the left", stagger))
+        ]
+        drawn.append(draw_panels(f"Wire of track {course.track_id}", panels, (0.0, course.length_m), "chainage [m]"))
+    yield section("Contact wires", table(headings, rows), *drawn, note(WIRE_LIMITS))

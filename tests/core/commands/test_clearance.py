@@ -1,0 +1,108 @@
+"""Measure Clearance as a command: own profiles, kilometres, other coordinate systems, and wrong inputs."""
+
+import numpy as np
+import pytest
+from rail_extract.__main__ import main
+from rail_extract.core.clouds.crs import parse_crs
+from rail_extract.core.disk import Destination
+from rail_extract.core.fields import CENTERLINES, RAILS
+from rail_extract.core.files.layers import lines_layer
+from rail_extract.core.files.writing import write_layers
+from rail_extract.core.frame import LocalFrame
+from rail_extract.laboratory.curves import Element
+from rail_extract.laboratory.scenes import clearance as scenes
+from rail_extract.laboratory.scenes.las import write_las
+
+pyogrio, shapely = pytest.importorskip("pyogrio"), pytest.importorskip("shapely")
+pyproj = pytest.importorskip("pyproj")
+
+ORIGIN = np.array([578_000.0, 5_804_000.0, 0.0])
+BOX = [(-1.7, 0.3), (1.7, 0.3), (1.7, 4.0), (-1.7, 4.0), (-1.7, 0.3)]
+
+
+def written(path, layer, geometry, kind, crs=None):
+    wkb = np.array([shapely.to_wkb(geometry, output_dimension=3 if kind.endswith("Z") else 2)], object)
+    pyogrio.raw.write(
+        str(path), layer=layer, driver="GPKG", geometry_type=kind, crs=crs, geometry=wkb, field_data=[], fields=[]
+    )
+    return path
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory):
+    """A straight of 60 m in EPSG:25832 with a plate 1.645 m - 50 mm to the left at 20 m, and its lines."""
+    folder = tmp_path_factory.mktemp("clearance")
+    scene = scenes.double_track(1, 500.0, (Element(60.0),), 0.0, 0.0, apart_m=0.0)
+    scenes.bed(scene, 3.0)
+    scenes.plate(scene, 20.0, 1, 1.645 - 0.050, (1.5, 2.5))
+    write_las(folder / "cloud.laz", scene.points + ORIGIN, "EPSG:25832", classification=scene.codes)
+    tracks, rails = scenes.lines_of(scene)
+    for name, crs in (("own", "EPSG:25832"), ("other", "EPSG:25833")):
+        change = pyproj.Transformer.from_crs(parse_crs("EPSG:25832"), parse_crs(crs), always_xy=True).transform
+        frame = LocalFrame(np.zeros(3), crs_wkt=parse_crs(crs).to_wkt())
+
+        def moved(line, change=change):
+            x, y, z = (line.xyz + ORIGIN).T
+            return np.column_stack([*change(x, y), z])
+
+        layers = [
+            lines_layer(product, [type(one)(**{**vars(one), "xyz": moved(one)}) for one in lines])
+            for product, lines in ((RAILS, rails), (CENTERLINES, tracks))
+        ]
+        write_layers(layers, Destination.at(folder / f"{name}.gpkg"), frame)
+    axis = shapely.LineString((tracks[0].xyz + ORIGIN)[:, :2])
+    written(folder / "axis.gpkg", "axis", axis, "LineString", "EPSG:25832")
+    written(folder / "box.gpkg", "box", shapely.Polygon(BOX), "Polygon")
+    return folder
+
+
+def clearance(place, out, *more, lines="own"):
+    """Run the command; returns its exit status and the rows of the intrusions."""
+    given = [f"{place / lines}.gpkg|layername=centerlines", str(place / "cloud.laz")]
+    given += ["--rails", f"{place / lines}.gpkg|layername=rails", "--intrusions", str(out)]
+    status = main(["clearance", *given, *map(str, more)])
+    if status:
+        return status, []
+    meta, _, _, columns = pyogrio.raw.read(str(out))
+    return status, [dict(zip(meta["fields"].tolist(), row)) for row in zip(*columns)]
+
+
+def test_kilometres_are_those_of_the_axis(place, tmp_path):
+    status, (row,) = clearance(place, tmp_path / "out.gpkg", "--axis", place / "axis.gpkg", "--start-km", "12.3")
+    assert status == 0
+    assert row["km"] == pytest.approx(12.3 + row["chainage_m"] / 1000, abs=1e-5)
+    assert row["km_text"].startswith("12.3+2")
+    assert row["pen_mm"] == pytest.approx(50, abs=4)
+
+
+def test_a_drawn_polygon_is_a_profile(place, tmp_path):
+    _, (row,) = clearance(place, tmp_path / "out.gpkg", "--profile", "CUSTOM", "--profile-file", place / "box.gpkg")
+    assert row["pen_mm"] == pytest.approx(105, abs=4)
+    assert row["side"] == "left"
+
+
+def test_lines_in_another_coordinate_system_give_the_same(place, tmp_path):
+    (row,), (same,) = (clearance(place, tmp_path / f"{one}.gpkg", lines=one)[1] for one in ("own", "other"))
+    assert same["pen_mm"] == pytest.approx(row["pen_mm"], abs=0.5)
+    assert same["chainage_m"] == pytest.approx(row["chainage_m"], abs=0.05)
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        (("--profile", "CUSTOM"), "--profile is CUSTOM: name a file with the columns v_m and w_m in --profile-file."),
+        (("--profile", "US_WA", "--widening", "EBO"), "--profile US_WA has no rule for curves"),
+        (("--margin", "3000"), "--margin can't be 3000: give a number from 0 to 2,000."),
+        (("--classes-out", "trees"), '--classes-out "trees" must be whole numbers'),
+    ],
+)
+def test_a_wrong_input_gets_one_sentence(place, tmp_path, capsys, more, words):
+    try:
+        status, _ = clearance(place, tmp_path / "out.gpkg", *more)
+    except SystemExit as ended:
+        status = ended.code
+    said = capsys.readouterr().err
+    assert status
+    assert words in said
+    assert "Traceback" not in said
+    assert not (tmp_path / "out.gpkg").exists()
