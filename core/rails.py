@@ -409,9 +409,11 @@ class SearchFigures:
         Length of rails where the blur of the cloud hides how wide a head is.
     blur_m2 : float
         The blur there, a standard deviation, times this length.
+    filled_m : float
+        Length of rails in a cloud that was searched for heads just above the ballast.
     sharp_m, round_m : float
         Length of the rails with a partner that are as narrow as a head, and of those that are wider and round, before
-        the cloud is known to be blunt; see `classify.sharpness`.
+        the cloud is known to be blunt; see `classify.ways`.
     unsure_m : float
         Length of those that are wider and not round, and of rails in pavements.
     """
@@ -427,6 +429,7 @@ class SearchFigures:
     across_m: float = 0.0
     blunt_m: float = 0.0
     blur_m2: float = 0.0
+    filled_m: float = 0.0
     sharp_m: float = 0.0
     round_m: float = 0.0
     unsure_m: float = 0.0

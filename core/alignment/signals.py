@@ -23,6 +23,10 @@ there is none, because the search then bends a track with it."""
 SMOOTHED_M = 12.0
 """Distance over which the errors of a smoothed line hang together, metres: about that of the rails of Extract rails."""
 
+SINGLE_SHARE = 0.25
+"""Share of the least error of a smoothed line by which its points err within less than `SMOOTHED_M`: lines of Extract
+rails are off by 0.2 to 0.4 mm over a few metres, and an arc of 10 m would be made of less."""
+
 FLOOR_M = 0.00005
 """Least standard deviation of a point, metres: below it, coordinates are rounded."""
 
@@ -117,18 +121,22 @@ def noise_of(signal: Signal, tolerance_m: float, progress: Progress = SILENT) ->
             break
         sigma = left
     if estimated(rests, signal.step_m, FLOOR_M, LIKELY).shared_m:
-        return _at_least(noise, signal.kind.least_m), pieces
+        return _at_least(noise, signal.kind.least_m, signal.step_m), pieces
     rests, pieces = tried[0]
-    return _at_least(estimated(rests, signal.step_m, FLOOR_M, np.inf), signal.kind.least_m), pieces
+    return _at_least(estimated(rests, signal.step_m, FLOOR_M, np.inf), signal.kind.least_m, signal.step_m), pieces
 
 
-def _at_least(noise: Noise, least_m: float) -> Noise:
-    """Return a noise whose standard deviation is at least `least_m`; neighbours share what is added."""
+def _at_least(noise: Noise, least_m: float, step_m: float) -> Noise:
+    """Return a noise whose standard deviation is at least `least_m`; neighbours share what is added.
+
+    Misalignment that is less than this counts as errors of single points that bend long elements as much.
+    """
     lack = least_m**2 - noise.white_m**2 - noise.shared_m**2
     if lack <= 0.0:
         return noise
-    length_m = SMOOTHED_M if lack > noise.shared_m**2 else noise.length_m
-    return Noise(noise.white_m, math.sqrt(noise.shared_m**2 + lack), length_m)
+    if lack <= noise.shared_m**2:
+        return Noise(noise.white_m, math.sqrt(noise.shared_m**2 + lack), noise.length_m)
+    return Noise(max(noise.effective_m(step_m), SINGLE_SHARE * least_m), math.sqrt(lack), SMOOTHED_M)
 
 
 def _residuals(pieces: list[Polynomial], s: np.ndarray, y: np.ndarray) -> list[tuple[np.ndarray, int]]:

@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..classify.settings import Settings
-from ..classify.sharpness import search_alike
+from ..classify.settings import Settings, Way
 from ..classify.square import classify_square
+from ..classify.ways import search_alike
 from ..clouds.points import Request
 from ..errors import CloudError, ParameterError
 from ..heads.head_points import judged
@@ -127,9 +127,9 @@ class _Found(NamedTuple):
 def _found(squares: Sequence[_Square], settings: Settings) -> list[_Found]:
     """Find the points on rails in squares of a raw cloud."""
 
-    def search(some: Sequence[_Square], blunt: bool) -> Iterator[_Found]:
+    def search(some: Sequence[_Square], way: Way) -> Iterator[_Found]:
         for corner, xyz in some:
-            classified = classify_square(xyz - corner, replace(settings, blunt=blunt))
+            classified = classify_square(xyz - corner, replace(settings, way=way))
             yield _Found(xyz[classified.rail], classified.figures)
 
     return list(search_alike(squares, search))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from enum import Enum
 from pathlib import Path
 
 import numpy as np
@@ -72,6 +73,12 @@ BURIED = Band(low_m=0.04, depth_share=0.4, slab_m=0.012, shadows=False)
 """Tops of rails, and those of rails that are buried up to the head. A smooth surface shows these, too; a rough one has
 as much relief anywhere."""
 
+FILLED = Band(low_m=0.02, depth_share=0.5, slab_m=0.012)
+"""Tops of rails in a track that is filled with ballast up to the heads: its stones scatter by 1 cm."""
+
+FILLED_SHARE = 0.25
+"""`Tolerances.below_share` there: stones that count to a head 3 cm above them make it 3 cm wider than it is."""
+
 DENSE = Tolerances(
     along_m=0.035,
     spread_m=0.045,
@@ -110,6 +117,14 @@ something else by chance. Beside its crest, the ridge falls by up to 5 cm; noise
 limit that cut the lower side off would move the line, and one near the mean of the tops would lower it."""
 
 
+class Way(Enum):
+    """How a cloud is searched, one way for all of it: see `ways`."""
+
+    SHARP = "sharp"
+    BLUNT = "blunt"
+    FILLED = "filled"
+
+
 @dataclass(frozen=True)
 class Settings:
     """What the user chooses.
@@ -125,9 +140,9 @@ class Settings:
     weights : Path, optional
         Weights of a network that was trained on labelled clouds and replaces the geometry; see `learned`.
     low_m : float
-        Least height of a rail above the bed, unless it is in a pavement or blunt.
-    blunt : bool
-        Whether the cloud blurs heads to round ridges; see `sharpness`.
+        Least height of a rail above the bed in a sharp cloud, unless it is in a pavement.
+    way : Way
+        What the cloud shows: sharp heads, round ridges, or heads just above the ballast.
     """
 
     gauges_m: tuple[float, ...]
@@ -136,7 +151,21 @@ class Settings:
     guide: Guide | None = None
     weights: Path | None = None
     low_m: float = LOW_M
-    blunt: bool = False
+    way: Way = Way.SHARP
+
+    @property
+    def blunt(self) -> bool:
+        """Whether the cloud blurs heads to round ridges."""
+        return self.way is Way.BLUNT
+
+    def tolerances(self, thin: bool) -> Tolerances:
+        """Return the tolerances for a square that is thin or dense."""
+        if self.way is Way.BLUNT:
+            return BLUNT
+        usual = THIN if thin else DENSE
+        if self.way is Way.FILLED:
+            return replace(usual, band=FILLED, below_share=FILLED_SHARE)
+        return replace(usual, band=replace(HEADS, low_m=self.low_m))
 
     @property
     def cell_m(self) -> float:

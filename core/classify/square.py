@@ -24,7 +24,7 @@ from .pieces import (
     with_partner,
 )
 from .ridges import Ridges, cells_beside, on_crests
-from .settings import BLUNT, DENSE, HEADS, MARGIN_M, THIN, Settings, Tolerances
+from .settings import BLUNT, MARGIN_M, Settings, Tolerances, Way
 from .tops import HIGH_M, MILLIMETRES, Band, Grid, Tops, highest_of_blocks, middles_of_tops, narrow_tops, tops_of
 
 THIN_PER_M2 = 400.0
@@ -49,6 +49,10 @@ SINGLE_SLOPE = 0.3
 """Steepest bed of a rail without a partner: cant of 180 mm is 0.12, and a shoulder beside the rail makes it 0.22 at
 most; at the shoulder of a ballast bed it is 0.67. Where the far side of a slope is hidden, its crest looks like a bar
 on a bed of 0.38 and more."""
+
+FLAT_SHARE = 0.5
+"""Least share of the points on the width of a head just above the ballast that are in the height of its top: noise of a
+fifth of its height leaves nine of ten, and the crest of a furrow has one of five."""
 
 SHARP_WIDER_M = 0.016
 """Width beyond that of a head up to which a piece shows that the cloud is sharp. Measured over half of the rails of a
@@ -238,13 +242,13 @@ class Standing:
 
 def _standing(shown: Shown, settings: Settings) -> Standing:
     """Find rails that stand out of their bed: bars as narrow as a head, or the ridges of a blunt cloud."""
-    band = BLUNT.band if settings.blunt else replace(HEADS, low_m=settings.low_m)
+    band = settings.tolerances(thin=False).band
     found = Candidates.find(shown, band)
     density = _density(shown.bed.coarse, shown.tops.grid.middles(found.marks))
     thin = density < THIN_PER_M2
     if thin and band.shadows:  # few points fill a strip by chance
         found = Candidates.find(shown, replace(band, shadows=False))
-    tolerances = BLUNT if settings.blunt else THIN if thin else DENSE
+    tolerances = settings.tolerances(thin)
     kept = _kept(found, reach_at(density), tolerances, settings)
     if settings.blunt:
         return _on_ridges(kept, thin, shown, settings)
@@ -259,6 +263,8 @@ def _on_bars(
     chosen = label(shown.tops, heads, shown.cell, shown.height, tolerances)
     beside = Near.find(shown.xy[chosen], kept.lines)
     narrow, *kinds = _widths(kept, beside, shown, settings, tolerances)
+    if settings.way is Way.FILLED:
+        narrow &= _are_flat(kept, chosen, shown, settings.head_width_m)
     standing = _wanted(kept, narrow, chosen, beside, thin, settings, tolerances)
     share_m = _share_m(kept, settings)
     sharp_m, round_m, unsure_m = (float(share_m[kind].sum()) for kind in kinds)
@@ -318,6 +324,7 @@ def _standing_figures(standing: Standing, settings: Settings) -> SearchFigures:
         across_m=float(across_m),
         blunt_m=blunt_m,
         blur_m2=blunt_m * standing.blur_m,
+        filled_m=float(share_m.sum()) if settings.way is Way.FILLED else 0.0,
         sharp_m=standing.sharp_m,
         round_m=standing.round_m,
         unsure_m=standing.unsure_m,
@@ -453,6 +460,24 @@ def _widths(
         rounded = rounded & (spread_m > settings.head_width_m / 2)[piece]
         unsure = unsure & (spread_m <= settings.head_width_m / 2)[piece]
     return np.where(partnered, narrow[piece], alone[piece]), sharp, rounded, unsure
+
+
+def _are_flat(kept: Kept, chosen: np.ndarray, shown: Shown, head_width_m: float) -> np.ndarray:
+    """Return which cells belong to pieces with flat tops, (n,) bool, given the points in the height of their tops.
+
+    They hold as many points as the heads of a square that is not thin: a few may be level by chance.
+    """
+    if not len(kept.cell):
+        return np.zeros(0, dtype=bool)
+    piece, near = pieces_of(len(kept.cell), kept.pairs), Near.find(shown.xy, kept.lines)
+    place, nearest = np.unique(near.place, return_index=True)
+    inside = np.abs(near.across[nearest]) <= head_width_m / 2
+    number = piece[near.cell[nearest[inside]]]
+    every, level = (
+        np.bincount(number, np.isin(place[inside], which), int(piece.max()) + 1) for which in (place, chosen)
+    )
+    dense = every >= THIN_PER_M2 * head_width_m * lengths(kept.lines.axis, piece)
+    return (dense & (level >= FLAT_SHARE * every))[piece]
 
 
 def _stands_alone(

@@ -49,13 +49,25 @@ HEAD_M, RAIL_M = 0.04, 0.20
 """Depths below the crown down to which points are on the head, and on web and foot and on the sleeper below the tallest
 rails. The faces of a head end at 37 mm on 60E1, and at 45 mm on the tallest head of the standards."""
 
-NOISE_SIGMAS = 2.0
-"""Standard deviations of the noise of heights by which points on the lower ends of faces may be deeper."""
+NOISE_SIGMAS, SCATTER_SIGMAS = 3.0, 2.0
+"""Standard deviations of the noise of heights by which points on the lower ends of faces may be deeper, and of the
+scatter of points about a face by which others may be off it: beams from the air see no upright face."""
+
+FACE_M = (0.015, 0.03)
+"""Depths below the crown between which the faces of a head are upright, whatever its wear: they show how wide it is."""
+
+FACES_PERCENT, MIN_ON_FACES = (20.0, 80.0), 10
+"""Percentiles of the offsets of the points on faces that tell both edges of a head, or twice the one that is seen; of
+five points, one may be a stray."""
 
 FOUND_HEAD_M, FOUND_SIGMAS = 0.036, 5.0
 """Depth below the crown of what was found in a raw cloud, and standard deviations of the noise if they are more, as in
-clouds from the air. The search takes all of the web down to 50 mm below the top where a rail is seen from the side. It
-shows right below the face, next to the axis: a line would take it for its crown. The lowest part of a face may go."""
+clouds from the air. The search takes all of the web down to 50 mm below the top where a rail is seen from the side; few
+points of a rail at such angles show its faces. The lowest part of a face may go."""
+
+RECESS_M = (0.015, 0.05)
+"""Distances of a web from the face above it: 20 mm or more on every standard, and the undersides of heads are between;
+beyond half of the widest head and half a web, what is there may be the other face."""
 
 FULL_SHARE = 0.5
 """Points in the crown as a share of those in the fullest part of the head: a scanner to one side sees more of the face
@@ -142,17 +154,28 @@ def on_heads(xyz: np.ndarray, found: bool = False) -> np.ndarray:
     cell = np.floor(xyz[:, :2] / PLACE_M).astype(np.int64)
     _, first, place = np.unique(cell @ [1 << 32, 1], return_index=True, return_inverse=True)
     place = place.ravel()
-    places, crown, noise_m = _seen_at(xyz[first, :2], xyz[_thinned(place)])
+    places, crown, faces = _seen_at(xyz[first, :2], xyz[_thinned(place)])
     level, slope = _course(places, crown)
     # Coordinate by coordinate: all points of a square are in memory beside what is made here.
     depth_m = level[place]
     depth_m -= xyz[:, 2]
-    for axis, way in enumerate((np.cos(places.direction), np.sin(places.direction))):
+    across_m = np.zeros(len(xyz), dtype=np.float32)
+    east, north = np.cos(places.direction), np.sin(places.direction)
+    for axis, (along, left) in enumerate(((east, -north), (north, east))):
         step = xyz[:, axis] - places.xy[place, axis]
-        step *= (slope * way)[place]
+        across_m += step * left[place]
+        step *= (slope * along)[place]
         depth_m += step
+    noise_m = _noise(depth_m)
     head_m = max(FOUND_HEAD_M, FOUND_SIGMAS * noise_m) if found else HEAD_M + NOISE_SIGMAS * noise_m
-    return ~((depth_m > head_m) & (depth_m <= RAIL_M))
+    off_m = np.full(len(xyz), np.inf, dtype=np.float32)
+    for edge in faces.astype(np.float32).T:
+        np.fmin(off_m, np.abs(across_m - edge[place]), out=off_m)
+    on_faces = (depth_m > FACE_M[0]) & (depth_m <= FACE_M[1]) & np.isfinite(off_m)
+    scatter_m = 1.4826 * float(np.median(off_m[on_faces])) if on_faces.any() else np.inf
+    recessed = (off_m > RECESS_M[0] + SCATTER_SIGMAS * scatter_m) & (off_m < RECESS_M[1])
+    recessed &= depth_m > FACE_M[1] + noise_m
+    return ~((recessed | (depth_m > head_m)) & (depth_m <= RAIL_M))
 
 
 def _thinned(place: np.ndarray) -> np.ndarray:
@@ -164,20 +187,27 @@ def _thinned(place: np.ndarray) -> np.ndarray:
     return order[chosen]
 
 
-def _seen_at(xy: np.ndarray, points: np.ndarray) -> tuple[Places, np.ndarray, float]:
+def _seen_at(xy: np.ndarray, points: np.ndarray) -> tuple[Places, np.ndarray, np.ndarray]:
     """Look at the points, (n, 3), around places, (p, 2).
 
-    Returns the places, the heights of their crowns, (p,) metres, NaN where none is seen, and the noise of heights.
+    Returns the places, the heights of their crowns, (p,) metres, and the offsets of their faces, (p, 2) metres; NaN
+    where none is seen.
     """
     tree, found = cKDTree(points[:, :2]), []
     for block in np.array_split(xy, -(-len(xy) // BLOCK)):
         places, own, point = Places.around(block, tree)
         across, z = places.across(own, points[point, :2] - places.xy[own]), points[point, 2]
         crown = _crowns(own, across, z, len(block))
-        above_m = z - crown[own]
-        found.append((places.xy, places.direction, crown, above_m[(above_m > 0) & (above_m < HEAD_M)]))
-    places_xy, direction, crown, above_m = (np.concatenate(each) for each in zip(*found))
-    return Places(places_xy, direction), crown, 1.4826 * float(np.median(above_m)) if len(above_m) else 0.0
+        faces = _faces(own, across, crown[own] - z, len(block))
+        found.append((places.xy, places.direction, crown, faces))
+    places_xy, direction, crown, faces = (np.concatenate(each) for each in zip(*found))
+    return Places(places_xy, direction), crown, faces
+
+
+def _noise(depth_m: np.ndarray) -> float:
+    """Return the noise of heights, metres: above the crown, nothing else spreads the points of heads; depths, (n,)."""
+    above_m = -depth_m[(depth_m < 0) & (depth_m > -HEAD_M)]
+    return 1.4826 * float(np.median(above_m)) if len(above_m) else 0.0
 
 
 def _crowns(place: np.ndarray, across: np.ndarray, z: np.ndarray, places: int) -> np.ndarray:
@@ -205,6 +235,22 @@ def _crowns(place: np.ndarray, across: np.ndarray, z: np.ndarray, places: int) -
     chosen = np.flatnonzero(near & (inside >= FULL_SHARE * fullest[place]))
     highest[place[chosen]] = z[chosen + inside[chosen] // 2]
     return highest
+
+
+def _faces(place: np.ndarray, across: np.ndarray, depth_m: np.ndarray, places: int) -> np.ndarray:
+    """Return the offsets of the right and the left face of the heads of places, (p, 2) metres, NaN where none is seen.
+
+    Where one face is seen, both are that one.
+    """
+    on = (depth_m > FACE_M[0]) & (depth_m <= FACE_M[1])
+    place, across = place[on], across[on]
+    order = np.lexsort((across, place))
+    across, count = across[order], np.bincount(place, minlength=places)
+    first, seen = np.cumsum(count) - count, count >= MIN_ON_FACES
+    edges = np.full((places, 2), np.nan)
+    for column, percent in enumerate(FACES_PERCENT):
+        edges[seen, column] = across[first[seen] + np.rint(percent / 100 * (count[seen] - 1)).astype(int)]
+    return edges
 
 
 def _windows(place: np.ndarray, z: np.ndarray) -> np.ndarray:

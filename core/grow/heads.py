@@ -14,8 +14,8 @@ from scipy.spatial import cKDTree
 
 from ..classify import settings as classify
 from ..classify.flush import BESIDE_M, HEAD_LEVEL_M
-from ..classify.sharpness import is_blunt, is_decided
 from ..classify.square import classify_square
+from ..classify.ways import is_blunt, is_decided
 from ..parameters import GrowParameters
 from ..polyline import Feet, Polyline
 from ..rails import SearchFigures
@@ -265,7 +265,7 @@ class OnHeads:
                 seen += self._classified((key[0] + step[0], key[1] + step[1])).figures
         self._is_decided = seen.sharp_m + seen.round_m + seen.unsure_m > 0
         if is_blunt(seen):
-            self._own = replace(self._own, blunt=True)
+            self._own = replace(self._own, way=classify.Way.BLUNT)
             self._squares.clear()
 
     def _classified(self, key: Key) -> _Square:

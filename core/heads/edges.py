@@ -57,6 +57,10 @@ MAX_BAND_SHARE, BAND_PERCENTILES = 0.4, (5.0, 95.0)
 MIN_HEIGHT_M = 0.012
 """Height of such a band, between the same percentiles and beyond its width: a face is 22 mm high."""
 
+OFF_AXIS = 0.25
+"""Distance of the axis from the middle of a band, in head widths, from which the band is a face, wherever the fit
+began: half of what it is on a face."""
+
 TOP_ABOVE_M = 0.022
 """Height of the top above the middle of a face and its corner."""
 
@@ -244,23 +248,31 @@ def find_flank(points: HeadPoints) -> Flank | None:
     if top - bottom < high - low + MIN_HEIGHT_M or top - bottom > 2 * FACE_DEPTH_M:
         return None
     middle, half = float(np.median(across)), 0.5 * head_width_m
-    grid, outline = Grid.of(head_width_m), Outline.of(head_width_m)
-    found = []
-    for left_m, top_m in ((middle, 0.0), (middle - half, TOP_ABOVE_M), (middle + half, TOP_ABOVE_M)):
-        bins = grid.number(across - left_m, up - top_m)
-        counts = np.bincount(bins[bins >= 0], minlength=grid.size).astype(float)
-        section = fit_section(counts, outline, grid)
-        strays = (len(up) - counts.sum()) * np.log(section.shares[-1] / grid.size)
-        found.append((log_likelihood(counts, section, outline, grid) + strays, left_m, top_m, section))
-    crown, *faces = found
-    other, best = sorted(faces, key=lambda one: one[0])
-    if best[0] - crown[0] < MIN_GAIN:
+    starts = ((middle, 0.0), (middle - half, TOP_ABOVE_M), (middle + half, TOP_ABOVE_M))
+    fits = np.array([_fitted_from(across, up, head_width_m, *start) for start in starts])
+    off_m = fits[:, 1] - middle
+    side = np.where(np.abs(off_m) > OFF_AXIS * head_width_m, np.sign(off_m), 0)
+    best = int(np.argmax(fits[:, 0]))
+    likely = fits[:, 0] > fits[best, 0] - MIN_GAIN
+    if (side[likely] == 0).any():
         return None
-    _, left_m, top_m, section = best
-    top_m += float(section.place[1])
-    if best[0] - other[0] < MIN_GAIN:
+    left_m, top_m = fits[best, 1:].tolist()
+    if (side[likely] != side[best]).any():
         return Flank(middle, top_m, half)
-    return Flank(left_m + float(section.place[0]), top_m, FLANK_SIGMA_M)
+    return Flank(left_m, top_m, float(np.hypot(FLANK_SIGMA_M, np.ptp(fits[likely, 1]))))
+
+
+def _fitted_from(
+    across: np.ndarray, up: np.ndarray, head_width_m: float, left_m: float, top_m: float
+) -> tuple[float, float, float]:
+    """Fit a head to points, from a place on: the logarithm of the likelihood, offset of the axis, height of the top."""
+    grid, outline = Grid.of(head_width_m), Outline.of(head_width_m)
+    bins = grid.number(across - left_m, up - top_m)
+    counts = np.bincount(bins[bins >= 0], minlength=grid.size).astype(float)
+    section = fit_section(counts, outline, grid)
+    strays = (len(up) - counts.sum()) * np.log(section.shares[-1] / grid.size)
+    likelihood = log_likelihood(counts, section, outline, grid) + strays
+    return likelihood, left_m + float(section.place[0]), top_m + float(section.place[1])
 
 
 @dataclass(frozen=True)

@@ -13,9 +13,10 @@ from pathlib import Path
 import numpy as np
 
 from ..classify.guide import MIDDLE_M, Guide
-from ..classify.settings import MARGIN_M, Settings
-from ..classify.sharpness import blunt_sources, search_alike
+from ..classify.settings import MARGIN_M, Settings, Way
 from ..classify.square import Classified, classify_square
+from ..classify.tops import LOW_M
+from ..classify.ways import blunt_sources, search_alike
 from ..clouds.passes import sources_of
 from ..clouds.points import Request, read_each
 from ..clouds.readers import CloudHeader, read_points, shows_scanner
@@ -103,32 +104,33 @@ class Search:
         if not blunt:
             yield from search_alike(_fullest(counts), self._alike)
             return
-        for is_blunt in (False, True):
+        for way in (Way.SHARP, Way.BLUNT):
+            is_blunt = way is Way.BLUNT
             own = frozenset(one for one in sources if (one in blunt) == is_blunt)
             keys = _fullest(sum((Counter(sources[one]) for one in own), Counter()))
-            tasks = {key: self._task(key, is_blunt, own) for key in keys}
+            tasks = {key: self._task(key, way, own) for key in keys}
             for _, found in self.runner.run(tasks, self.progress.span(0.5 * is_blunt, 0.5 + 0.5 * is_blunt)):
                 yield replace(found, fills=True, figures=found.figures.filling) if is_blunt else found
 
     def _seen(self, parts: Sequence[tuple[int, Key]]) -> Iterator[tuple[int, SearchFigures]]:
         """Search squares for the rails of one source each, as if it were sharp."""
-        tasks = {part: self._task(part[1], False, frozenset(part[:1])) for part in parts}
+        tasks = {part: self._task(part[1], Way.SHARP, frozenset(part[:1])) for part in parts}
         for (source, _), found in self.runner.run(tasks, self.progress.span(0.0, 0.0)):
             yield source, found.figures
 
-    def _alike(self, keys: Sequence[Key], blunt: bool) -> Iterator[Found]:
+    def _alike(self, keys: Sequence[Key], way: Way) -> Iterator[Found]:
         """Search squares for the rails of all sources."""
         count = len(counts_of(self.sorted_files))
         start, self.searched = self.searched, min(self.searched + len(keys), count)
-        tasks = {key: self._task(key, blunt) for key in keys}
+        tasks = {key: self._task(key, way) for key in keys}
         for _, found in self.runner.run(tasks, self.progress.span(start / count, self.searched / count)):
             yield found
 
-    def _task(self, key: Key, blunt: bool, sources: frozenset[int] | None = None) -> Task:
+    def _task(self, key: Key, way: Way, sources: frozenset[int] | None = None) -> Task:
         """Make the task that searches a square for the rails of some sources, or of all."""
         weight = SEARCH_S * sum(one.counts.get(key, 0) for one in self.sorted_files)
         square = Square.on_grid(key, self.settings.side_m, self.zero)
-        settings = replace(self.settings.at(key), blunt=blunt)
+        settings = replace(self.settings.at(key), way=way)
         arguments = (square, files_of(key, self.sorted_files), settings, sources)
         return Task(f"Searching square {key}", _search, arguments, weight=weight)
 
@@ -209,6 +211,11 @@ def report(figures: SearchFigures, request: Request, progress: Progress) -> None
             f"Heads are blunt on {figures.blunt_m:.0f} m of rail: the cloud blurs what it shows by "
             f"{100 * figures.blur_m:.0f} cm{_as_from_images(request)}, so that a head is a round ridge. A ridge "
             "counts as a rail only if it is long and has a partner at the distance of the gauge."
+        )
+    if figures.filled_m:
+        progress.warning(
+            f"{figures.filled_m:.0f} m of rails stand hardly {100 * LOW_M:.0f} cm out of their bed: boards and edges "
+            "are as low, so look at what was found."
         )
 
 

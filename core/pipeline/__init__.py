@@ -16,7 +16,7 @@ from .. import checks
 from ..checks.doubts import doubting_scatter, strip_courses
 from ..checks.points import occupied_squares, plausible
 from ..checks.standard import warn_of_spacing
-from ..classify.sharpness import blunt_among
+from ..classify.ways import blunt_among
 from ..clouds.points import RailPoints
 from ..errors import NoRailPointsError, NoTrackError, RailExtractError
 from ..frpdf.models import choose

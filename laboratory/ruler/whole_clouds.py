@@ -10,9 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core.classify.settings import MARGIN_M, Settings
-from ...core.classify.sharpness import blunt_sources, search_alike
+from ...core.classify.settings import MARGIN_M, Settings, Way
 from ...core.classify.square import Classified
+from ...core.classify.ways import blunt_sources, search_alike
 from ...core.grow.heads import GrowSettings, OnHeads, Rail
 from ...core.labelling.finding import search_square
 from ...core.progress import SILENT, Progress
@@ -42,16 +42,16 @@ def classify_cloud(
     context, mixed = Context({}, Once(), progress), False
     around_them = Tiling(settings.side_m, MARGIN_M).sort(xyz)
 
-    def search(some: Sequence[Key], blunt: bool, which: np.ndarray) -> Iterator[Part]:
+    def search(some: Sequence[Key], way: Way, which: np.ndarray) -> Iterator[Part]:
         for key in progress.follow(some):
             number = around_them[key][which[around_them[key]]]
             corner = np.array([*np.multiply(key, settings.side_m), 0.0])
-            found = search_square(xyz[number] - corner, replace(settings.at(key), blunt=blunt), context)
-            yield Part(number[found.rail], found.figures.filling if blunt and mixed else found.figures)
+            found = search_square(xyz[number] - corner, replace(settings.at(key), way=way), context)
+            yield Part(number[found.rail], found.figures.filling if way is Way.BLUNT and mixed else found.figures)
 
     def seen(some: Sequence[tuple[int, Key]]) -> Iterator[tuple[int, SearchFigures]]:
         for source, key in some:
-            yield from ((source, part.figures) for part in search([key], False, own == source))
+            yield from ((source, part.figures) for part in search([key], Way.SHARP, own == source))
 
     def fullest(which: np.ndarray) -> list[Key]:
         keys, square = Tiling(settings.side_m).keys(xyz[which])
@@ -62,7 +62,7 @@ def classify_cloud(
     every, filling = np.ones(len(xyz), dtype=bool), np.isin(own, sorted(blunt))
     parts = [search_alike(fullest(every), partial(search, which=every))]
     if mixed:
-        parts = [search(fullest(which), way, which) for way, which in ((False, ~filling), (True, filling))]
+        parts = [search(fullest(which), way, which) for way, which in ((Way.SHARP, ~filling), (Way.BLUNT, filling))]
     for part in chain(*parts):
         rail[part.number] = True
         figures += part.figures

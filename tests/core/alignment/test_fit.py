@@ -57,6 +57,14 @@ def test_the_reversed_track_gives_the_mirrored_elements():
     np.testing.assert_allclose([x.k_from for x in one.plan], [-x.k_to for x in other.plan[::-1]], atol=2e-7)
 
 
+@pytest.mark.parametrize("seed", [1, 2, 5])
+def test_short_waves_of_a_smoothed_line_are_not_taken_for_elements(seed):
+    smooth = surveyed(design(), np.random.default_rng(seed), 0.00003, 0.0004, 6.0)[::3]
+    found = fit(Track(1, smooth, NONE, np.zeros(len(smooth), dtype=bool))).alignment
+    assert len(found.plan) == len(SHAPES)
+    assert len(found.vertical) == 3
+
+
 @pytest.mark.parametrize("seed", [0, 3])
 def test_errors_of_a_smoothed_line_are_not_taken_for_elements(seed):
     shapes = [(20.0, 0, 0), (90.0, 0, -1 / 1200), (60.0, -1 / 1200, -1 / 1200), (90.0, -1 / 1200, 0), (20.0, 0, 0)]

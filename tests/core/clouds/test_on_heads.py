@@ -58,6 +58,16 @@ def test_a_rail_far_beside_the_scanner_shows_its_web_as_well_as_its_head():
     assert found[(z < -0.045) & (z > -0.06)].mean() < 0.3 * kept[(z < -0.045) & (z > -0.06)].mean()
 
 
+def test_a_web_right_below_the_face_that_a_tripod_sees_is_left_out():
+    random = np.random.default_rng(4)
+    x, z = random.uniform(0, 40, 3000), random.uniform(-0.06, 0.0, 3000)
+    across = np.interp(z, [-0.06, -0.045, -0.0375, -0.008, 0.0], [0.01, 0.012, 0.036, 0.036, 0.0])
+    xyz = np.column_stack([x, across, z]) + random.normal(0, 0.0015, (3000, 3))
+    kept = on_heads(xyz)
+    assert kept[z > -0.035].mean() > 0.99
+    assert kept[z < -0.048].mean() < 0.1
+
+
 @pytest.mark.parametrize("share", [0.1, 0.5])
 def test_few_points_of_the_foot_are_left_out_as_well(share):
     xyz, part = rail(30.0)

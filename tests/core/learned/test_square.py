@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from rail_extract.core.classify.settings import MARGIN_M, Settings
+from rail_extract.core.classify.settings import MARGIN_M, Settings, Way
 from rail_extract.core.classify.square import classify_square
 from rail_extract.core.learned.square import label_square
 from rail_extract.laboratory.scenes.raw_catalogue import RAW_SCENES
@@ -47,7 +47,7 @@ def test_points_from_half_on_are_labelled(value, share):
 
 def test_blunted_rails_are_found_whatever_the_network_says():
     scene = RAW_SCENES["photo curve blunt"](2)
-    settings = Settings((scene.standard.gauge_m,), scene.standard.head_width_m, blunt=True)
+    settings = Settings((scene.standard.gauge_m,), scene.standard.head_width_m, way=Way.BLUNT)
     corner = scene.rails[0][len(scene.rails[0]) // 2] - [20.0, 20.0, 0.0]
     xyz = scene.xyz - corner
     xyz = xyz[((xyz[:, :2] > -MARGIN_M) & (xyz[:, :2] < settings.side_m + MARGIN_M)).all(axis=1)]

@@ -1,13 +1,13 @@
-"""Sharp or blunt, once per cloud."""
+"""The way in which a cloud is searched, once per cloud."""
 
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 import pytest
-from rail_extract.core.classify.settings import Settings
-from rail_extract.core.classify.sharpness import blunt_among, blunt_sources, is_blunt, search_alike
+from rail_extract.core.classify.settings import Settings, Way
 from rail_extract.core.classify.square import classify_square
+from rail_extract.core.classify.ways import blunt_among, blunt_sources, is_blunt, search_alike
 from rail_extract.core.rails import SearchFigures
 from rail_extract.laboratory.ruler.classification import lines_from, score, settings_of
 from rail_extract.laboratory.ruler.whole_clouds import classify_cloud
@@ -17,38 +17,39 @@ from scipy.special import ndtr
 
 class Found(NamedTuple):
     part: tuple[float, float]
-    blunt: bool
+    way: Way
     figures: SearchFigures
 
 
 def ways(*parts):
     """Search parts with lengths of sharp and of round rails, and return in which way each was searched at last."""
 
-    def search(some, blunt):
+    def search(some, way):
         for sharp_m, round_m in some:
-            figures = SearchFigures() if blunt else SearchFigures(sharp_m=sharp_m, round_m=round_m)
-            yield Found((sharp_m, round_m), blunt, figures)
+            seen = SearchFigures(paired_m=sharp_m + round_m, sharp_m=sharp_m, round_m=round_m)
+            yield Found((sharp_m, round_m), way, seen if way is Way.SHARP else SearchFigures())
 
     found = list(search_alike(parts, search))
     assert [one.part for one in found] == list(parts)
-    return [one.blunt for one in found]
+    return [one.way for one in found]
 
 
 @pytest.mark.parametrize(
-    ("parts", "blunt"),
+    ("parts", "way"),
     [
-        ([(80.0, 0.6)] * 3, False),
-        ([(80.0, 0.6), (0.0, 90.0)], False),
-        ([(0.0, 80.0)] * 9, True),
-        ([(2.0, 80.0)] * 9, True),
-        ([(0.0, 0.0)] * 9, False),
-        ([(0.0, 0.0)] * 7 + [(0.0, 12.0)], True),
-        ([(0.0, 0.0)] * 7 + [(12.0, 3.0)], False),
-        ([], False),
+        ([(80.0, 0.6)] * 3, Way.SHARP),
+        ([(80.0, 0.6), (0.0, 90.0)], Way.SHARP),
+        ([(0.0, 80.0)] * 9, Way.BLUNT),
+        ([(2.0, 80.0)] * 9, Way.BLUNT),
+        ([(0.0, 0.0)] * 9, Way.FILLED),
+        ([(0.0, 0.0)] * 7 + [(0.0, 12.0)], Way.BLUNT),
+        ([(0.0, 0.0)] * 7 + [(12.0, 3.0)], Way.FILLED),
+        ([(0.0, 0.0)] * 7 + [(18.0, 3.0)], Way.SHARP),
+        ([], Way.FILLED),
     ],
 )
-def test_all_parts_are_searched_in_one_way(parts, blunt):
-    assert ways(*parts) == [blunt] * len(parts)
+def test_all_parts_are_searched_in_one_way(parts, way):
+    assert ways(*parts) == [way] * len(parts)
 
 
 @pytest.mark.parametrize(("round_m", "unsure_m", "blunt"), [(157.0, 29.0, True), (5.0, 200.0, False)])
@@ -86,7 +87,7 @@ def test_the_blur_is_that_of_rails():
     wall_m = xy[:, :1] - np.array([2.5, 9.0])
     walls_m = 0.32 * (ndtr((wall_m + 0.1) / 0.015) - ndtr((wall_m - 0.1) / 0.015)).sum(axis=1)
     xyz = np.column_stack([xy, rails_m + walls_m + 0.004 * rng.standard_normal(len(xy))])
-    figures = classify_square(xyz, Settings((1.435,), 0.072, blunt=True)).figures
+    figures = classify_square(xyz, Settings((1.435,), 0.072, way=Way.BLUNT)).figures
     assert figures.blunt_m == pytest.approx(2 * 16.0, rel=0.1)
     assert figures.blur_m == pytest.approx(0.062, rel=0.2)
 
@@ -96,6 +97,24 @@ def test_a_blunt_cloud_is_blunt_everywhere():
     figures = classify_cloud(scene.xyz, settings_of(scene)).figures
     assert figures.blunt_m == pytest.approx(figures.paired_m + figures.single_m)
     assert figures.blunt_m > 200
+
+
+def filled_track(share: float) -> np.ndarray:
+    """Two heads 3 cm above ballast of 900 points per square metre; a share of their points is on top, others below."""
+    rng = np.random.RandomState(6)
+    xy = rng.uniform(0.0, 16.0, (16 * 16 * 900, 2))
+    on = np.abs(np.abs(xy[:, 0] - 7.0) - (1.435 + 0.072) / 2) < 0.036
+    top = on & (rng.uniform(size=len(xy)) < share)
+    z = np.where(top, 0.03, 0.008 * rng.standard_normal(len(xy))) + 0.003 * rng.standard_normal(len(xy))
+    return np.column_stack([xy, z])
+
+
+@pytest.mark.parametrize(("share", "found_m"), [(1.0, 2 * 16.0), (0.3, 0.0)])
+def test_heads_just_above_the_ballast_are_flat(share, found_m):
+    xyz = filled_track(share)
+    figures = [classify_square(xyz, Settings((1.435,), 0.072, way=way)).figures for way in (Way.SHARP, Way.FILLED)]
+    assert figures[0].paired_m == 0
+    assert figures[1].paired_m == figures[1].filled_m == pytest.approx(found_m, abs=1.0)
 
 
 SHARP, ROUND, NOTHING = (30.0, 2.0), (0.5, 60.0), (0.0, 0.0)

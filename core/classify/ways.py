@@ -1,7 +1,8 @@
-"""Whether a cloud is sharp or blunt: a property of the scanner or camera, hence of the cloud and not of a square.
+"""The way in which a cloud is searched: one for all of it, because it follows from the scanner and the railway.
 
-Where a cloud has several sources, scanners and cameras, each of them is sharp or blunt. Rails are the only things of
-known width. A cloud that shows some of them as narrow as their heads is sharp, whatever else it shows
+Rails are the only things of known width. A cloud that shows some of them as narrow as their heads is sharp, whatever
+else it shows, and one that shows round ones only is blunt. One that shows none has tracks that are filled with ballast
+up to the heads, or no tracks. Of several sources, scanners and cameras, each is sharp or blunt
 (docs/classification.md).
 """
 
@@ -11,6 +12,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Protocol, TypeVar
 
 from ..rails import SearchFigures
+from .settings import Way
 
 SHARP_M = 20.0
 """Length of rails as narrow as their heads that shows a cloud to be sharp. Measured: less than 2 m of a drone survey's
@@ -93,17 +95,24 @@ def blunt_sources(
     return blunt_among(seen)
 
 
-def search_alike(parts: Sequence[Part], search: Callable[[Sequence[Part], bool], Iterable[Answer]]) -> Iterator[Answer]:
-    """Search all parts of a cloud, those that show most first, in the way that suits it: as a sharp or a blunt one."""
+def shows_no_rails(seen: SearchFigures) -> bool:
+    """Return whether a cloud shows too few rails to tell, by the sum of the figures of all of its parts."""
+    return seen.paired_m < SHARP_M
+
+
+def search_alike(parts: Sequence[Part], search: Callable[[Sequence[Part], Way], Iterable[Answer]]) -> Iterator[Answer]:
+    """Search all parts of a cloud, those that show most first, in the way that suits it."""
     seen, done = SearchFigures(), 0
     found: list[Answer] = []
     while done < len(parts) and not is_decided(seen):
         batch = parts[done : done + max(done, FIRST_PARTS)]
-        answers = list(search(batch, False))
+        answers = list(search(batch, Way.SHARP))
         seen = sum((answer.figures for answer in answers), seen)
         done, found = done + len(batch), found + answers
     if is_blunt(seen):
-        yield from search(parts, True)
+        yield from search(parts, Way.BLUNT)
+    elif done == len(parts) and shows_no_rails(seen):
+        yield from search(parts, Way.FILLED)
     else:
         yield from found
-        yield from search(parts[done:], False)
+        yield from search(parts[done:], Way.SHARP)
