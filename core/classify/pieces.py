@@ -84,6 +84,11 @@ def lengths(xy: np.ndarray, piece: np.ndarray) -> np.ndarray:
     return np.hypot(*(high - low).T)
 
 
+def mean_of(values: np.ndarray, piece: np.ndarray) -> np.ndarray:
+    """Return the mean of the cells' values, (cells,), over each piece, (pieces,)."""
+    return np.bincount(piece, values) / np.bincount(piece)
+
+
 def long_enough(
     lines: Lines,
     pairs: np.ndarray,

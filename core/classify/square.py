@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..rails import SearchFigures
+from .alone import are_solid, may_hide_partner
 from .bed import COARSE_M, Bed, Coarse
 from .flush import NO_FLUSH, Flush, flush_rails
 from .labels import Near, label, whole_heads
@@ -18,6 +19,7 @@ from .pieces import (
     links,
     long_enough,
     lower_than_beside,
+    mean_of,
     pieces_of,
     shares_of_length,
     stands_free,
@@ -452,7 +454,7 @@ def _widths(
     partnered = with_partner(kept.pairs, kept.paired)
     narrow = width_m < settings.head_width_m + tolerances.wider_m
     rails = kept.lines.height[partnered & narrow[piece] & (lengths(kept.lines.axis, piece) >= LEAST_SINGLE_M)[piece]]
-    alone = _stands_alone(kept, piece, width_m, rails, shown.bed, settings, tolerances)
+    alone = _stands_alone(kept, piece, width_m, rails, shown, settings, tolerances)
     sharp = partnered & (width_m < settings.head_width_m + SHARP_WIDER_M)[piece]
     rounded = unsure = partnered & ~sharp
     if rounded.any():
@@ -485,24 +487,25 @@ def _stands_alone(
     piece: np.ndarray,
     width_m: np.ndarray,
     rails: np.ndarray,
-    bed: Bed,
+    shown: Shown,
     settings: Settings,
     tolerances: Tolerances,
 ) -> np.ndarray:
     """Return which pieces, of (pieces,) widths, may be rails without a partner, (pieces,) bool.
 
     They are as narrow as a head and no narrower, stand as high as a rail does that is not buried in ballast, or as the
-    rails that have a partner, (k,) heights, and their bed is not steeper than a track's.
+    rails that have a partner, (k,) heights, their bed is not steeper than a track's, the other rail may be hidden, and
+    they overhang.
     """
     narrow = width_m < settings.head_width_m + tolerances.wider_single_m
     narrow &= width_m >= SINGLE_WIDTH * settings.head_width_m
-    height_m = _mean(kept.lines.height, piece)
+    height_m = mean_of(kept.lines.height, piece)
     high = height_m >= SINGLE_HEIGHT_M
     if len(rails):
         high |= np.abs(height_m - np.median(rails)) < AS_HIGH_M
-    return narrow & high & (_mean(bed.slopes(kept.lines.axis), piece) <= SINGLE_SLOPE)
-
-
-def _mean(values: np.ndarray, piece: np.ndarray) -> np.ndarray:
-    """Return the mean of the cells' values, (cells,), over each piece, (pieces,)."""
-    return np.bincount(piece, values) / np.bincount(piece)
+    alone = narrow & high & (mean_of(shown.bed.slopes(kept.lines.axis), piece) <= SINGLE_SLOPE)
+    mine = alone[piece] & ~with_partner(kept.pairs, kept.paired)
+    lines, (numbers, number) = kept.lines.of(mine), np.unique(piece[mine], return_inverse=True)
+    hidden = may_hide_partner(lines, number, shown.tops, settings, tolerances.partner_m)
+    alone[numbers] = hidden & ~are_solid(lines, number, shown.xy, shown.height, settings.head_width_m)
+    return alone

@@ -135,9 +135,33 @@ def test_a_lone_rail_stands_as_high_as_the_other_rails(height_m, kept):
     track, on = with_track(flat(16.0, rng=rng, per_m2=1200), GAUGE, WIDTH, 0.0)
     track[on, 2] = 0.07
     xyz, bar = with_bar(track, WIDTH, 0.0, 5.0, height_m)
+    shown = turned(xyz, 0.0)[1] < 5.2
+    xyz, bar = xyz[shown], bar[shown]
     found = classify_square(rough(xyz, rng, 0.005), SETTINGS).rail
     assert (found & bar).any() == kept
     assert (found & ~bar).any()
+
+
+@pytest.mark.parametrize(("wide_m", "kept"), [(0.0, False), (0.04, False), (0.20, True)])
+def test_a_lone_bar_is_a_rail_where_something_may_hide_the_other_one(wide_m, kept):
+    """Nothing is seen in a strip at gauge, which is as wide as a head, or narrower."""
+    rng = np.random.RandomState(21)
+    xyz, _ = with_bar(flat(10.0, rng=rng, per_m2=2000), WIDTH, 0.3, -1.0)
+    hidden = np.abs(turned(xyz, 0.3)[1] + 1.0 - SPACING) < wide_m / 2
+    assert classify_square(rough(xyz, rng)[~hidden], SETTINGS).rail.any() == kept
+
+
+@pytest.mark.parametrize(("behind_m", "kept"), [(0.0, False), (0.028, True)])
+def test_a_lone_bar_overhangs_if_it_is_a_rail(behind_m, kept):
+    """A scanner sees the face of its head, and what is below: a web, 28 mm behind the face, or more of the face."""
+    rng = np.random.RandomState(22)
+    xyz, _ = with_bar(flat(10.0, rng=rng, per_m2=2000), WIDTH, 0.3)
+    xyz = xyz[turned(xyz, 0.3)[1] < WIDTH / 2]
+    along, below = rng.uniform(-4.5, 4.5, 6000), rng.uniform(0.0, TOP_M, 6000)
+    left = -WIDTH / 2 + np.where(below < 0.04, 0.0, behind_m)
+    place = np.column_stack([along * np.cos(0.3) - left * np.sin(0.3), along * np.sin(0.3) + left * np.cos(0.3)])
+    face = np.column_stack([place + MIDDLE, TOP_M - below])
+    assert classify_square(np.concatenate([rough(xyz, rng), face]), SETTINGS).rail.any() == kept
 
 
 def test_feet_and_webs_are_not_labelled():
@@ -160,7 +184,8 @@ def test_a_lone_profile_of_the_scanner_is_no_rail(width_m, expected):
     bed = rough(flat(8.0, rng=rng, per_m2=1500), rng)
     along, across = rng.uniform(-4, 4, 3000), rng.uniform(-width_m / 2, width_m / 2, 3000)
     bar = np.column_stack([along + MIDDLE[0], across + MIDDLE[1], rng.normal(TOP_M, 0.002, len(along))])
-    bed = bed[np.abs(bed[:, 1] - MIDDLE[1]) > WIDTH]
+    left = bed[:, 1] - MIDDLE[1]
+    bed = bed[(np.abs(left) > WIDTH) & (np.abs(left - SPACING) > 0.1)]
     assert classify_square(np.concatenate([bed, bar]), SETTINGS).rail.any() == expected
 
 

@@ -9,7 +9,7 @@ from rail_extract.__main__ import main, parse
 from rail_extract.core.commands.files import read_value
 from rail_extract.core.errors import ParameterError, RailExtractError
 from rail_extract.core.jobs import CALLS, JOBS
-from rail_extract.core.jobs.declaration import Choice, Number
+from rail_extract.core.jobs.declaration import Choice, LayerOutput, Number
 
 REQUIRED = {name: [one.name for one in job.parameters if one.required] for name, job in CALLS.items()}
 
@@ -31,7 +31,8 @@ def test_function_and_command_take_what_the_toolbox_takes(name):
     taken = inspect.signature(getattr(rx, name)).parameters
     assert sorted(taken) == sorted([*(one.lower() for one in names), "progress"])
     for one in (*job.parameters, *job.outputs):
-        assert taken[one.name.lower()].default == (inspect.Parameter.empty if one.required else one.default)
+        is_needed = one.required and not isinstance(one, LayerOutput)  # the result keeps its layers
+        assert taken[one.name.lower()].default == (inspect.Parameter.empty if is_needed else one.default)
     outputs = [word for one in job.outputs if not one.optional for word in (f"--{one.name.lower()}", "out")]
     args = parse([name.replace("_", "-"), *REQUIRED[name], *outputs])
     assert set(names) <= set(vars(args))
