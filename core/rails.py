@@ -114,6 +114,8 @@ class RailLine:
         Tracks of the rail; empty for a lone rail, and before rails are paired.
     sigmaz_mm : float
         Standard error of the line's height; NaN if it is unknown.
+    fills : bool
+        Whether blunt points show the line where the sharp ones of the cloud do not.
     """
 
     xyz: np.ndarray
@@ -127,6 +129,7 @@ class RailLine:
     support: Support | None = None
     track_ids: tuple[int, ...] = ()
     sigmaz_mm: float = np.nan
+    fills: bool = False
 
     @property
     def length_m(self) -> float:
@@ -433,6 +436,11 @@ class SearchFigures:
 
     def __add__(self, other: SearchFigures) -> SearchFigures:
         return SearchFigures(*(one + more for one, more in zip(astuple(self), astuple(other))))
+
+    @property
+    def filling(self) -> SearchFigures:
+        """What blunt sources add: figures of sharp ones count the same rails already, and cover the others for most."""
+        return SearchFigures(self.points, blunt_m=self.blunt_m, blur_m2=self.blur_m2)
 
     @property
     def cells_per_m(self) -> float:

@@ -8,9 +8,9 @@ from dataclasses import replace
 from ..parameters import Parameters
 from ..progress import Progress
 from ..rails import RailNetwork
-from ..tiles.grid import SortedPoints
+from ..tiles.grid import SortedPoints, drawn_from
 from .doubts import doubting_jumps, doubting_scatter, gauge_scatter, warn_of_strips
-from .lines import warn_of_rails, warn_of_split_classes, with_tracks
+from .lines import warn_of_filled, warn_of_rails, warn_of_split_classes, with_tracks
 from .points import warn_of_airborne, warn_of_unexplained
 from .standard import head_widths
 
@@ -23,7 +23,10 @@ def of(
     Returns the network, without lines that cannot be rails, and what `gauge_scatter` found.
     """
     for source in points.classes:
-        own = [rail for rail in network.rails if rail.class_code == source.class_code]
+        own = [rail for rail in network.rails if drawn_from(rail, source)]
+        if source.fills:
+            warn_of_filled(own, progress)
+            continue
         warn_of_rails(own, source.class_code, parameters, progress, points.search is not None)
         if own:
             warn_of_unexplained(source, own, progress)
@@ -33,9 +36,14 @@ def of(
     warn_of_split_classes(rails, parameters, progress)
     warn_of_strips(rails, parameters, progress)
     rails = doubting_jumps(rails, tracks, progress)
-    heads = head_widths(points.classes[0], parameters.gauges, progress, rails) if rails else None
+    first = points.classes[0]
+    own = [rail for rail in rails if not rail.fills]
+    heads = head_widths(first, parameters.gauges, progress, own) if rails else None
+    blunt = {rail.rail_id for rail in rails if rail.fills or (heads is not None and heads.blunt)}
     beyond_m: dict[int, float] = {}
-    if heads is not None and heads.blunt:
-        beyond_m = gauge_scatter(rails, tracks, parameters.gauges_m)
-        rails = [rail for rail in doubting_scatter(rails, beyond_m) if rail.track_ids or not points.only_pairs]
+    if blunt:
+        scatter = gauge_scatter(rails, tracks, parameters.gauges_m)
+        beyond_m = {one: more_m for one, more_m in scatter.items() if one in blunt}
+        kept = [rail.track_ids or rail.rail_id not in blunt or not points.only_pairs for rail in rails]
+        rails = [rail for rail, is_kept in zip(doubting_scatter(rails, beyond_m), kept) if is_kept]
     return replace(network, rails=tuple(rails), heads=heads), beyond_m

@@ -90,6 +90,16 @@ def _near(line: np.ndarray, places: np.ndarray) -> bool:
     return bool((places[:, :2].min(axis=0) < high).all() and (places[:, :2].max(axis=0) > low).all())
 
 
+def warn_of_filled(rails: Sequence[RailLine], progress: Progress) -> None:
+    """Warn the user of rails that only blunt points of a cloud show which has sharp ones as well."""
+    if rails:
+        length_m = sum(rail.length_m for rail in rails)
+        progress.warning(
+            "The cloud has sharp points and blunt ones, as of a scanner and of images. Where only blunt ones show a "
+            f"rail, on {length_m:,.0f} m, it is a line of its own: sigma_mm and sigmaz_mm say how exact it is."
+        )
+
+
 def warn_of_rails(
     rails: Sequence[RailLine], class_code: int, parameters: Parameters, progress: Progress, raw: bool = False
 ) -> None:

@@ -36,6 +36,15 @@ def marks_of(source_ids: np.ndarray, file_source_id: int, gps_time: np.ndarray |
     return ids << SLOT_BITS | _slots(gps_time, len(ids))
 
 
+def sources_of(marks: np.ndarray) -> np.ndarray:
+    """Tell scanners and cameras apart by the marks of points, (n,): whole numbers, alike for points of one source.
+
+    They differ where the source ids differ; of points with the same id, those without times are of another source, as
+    images have none.
+    """
+    return marks.astype(np.int64) >> SLOT_BITS << 1 | ((marks & (SLOTS - 1)) > 0)
+
+
 def _slots(gps_time: np.ndarray | None, count: int) -> np.ndarray:
     """Sort times into slots, (n,) uint32; all 0 if they count something else."""
     if gps_time is None or not gps_time.any():

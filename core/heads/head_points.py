@@ -68,6 +68,10 @@ blurred."""
 SHOULDER_SHARE = 0.2
 """Points per width on either shoulder, as a share of those on the crown, from which a blurred head goes on there."""
 
+ASIDE_HEADS, ASIDE_PLACES = 0.6, 25
+"""Distance from a line, in head widths, within which the crest of a strip is looked for, 4 cm by which surveys may be
+registered apart; and places at which it is, 4 mm from each other."""
+
 Widths = Union[float, np.ndarray]
 """Width of the heads of all lines, or of each line, (n,) metres."""
 
@@ -250,13 +254,37 @@ def judged(points: RailPoints, lines: Sequence[np.ndarray], widths: Widths) -> R
     return replace(points, blunt=near_lines(lines, points.xyz, widths)[0].is_blunt)
 
 
-def _are_blunt(heads: Sequence[HeadPoints]) -> bool:
-    """Return whether most of the length of lines shows blunt heads."""
+def about_crest(points: HeadPoints) -> HeadPoints:
+    """Return the points of a strip about the place across at which they are highest.
+
+    The strip may lie aside of a line that several show. A sharp head is level: seen from any place on it, heights do
+    not fall to both sides.
+    """
+    if not len(points.t):
+        return points
+    up, half_m = points.z - rough_level(points.t, points.z), CROWN_HEADS * points.width_m
+    order = np.argsort(points.across)
+    across, sums = points.across[order], np.append(0.0, np.cumsum(up[order]))
+    places = np.linspace(-ASIDE_HEADS, ASIDE_HEADS, ASIDE_PLACES) * points.width_m
+    first, last = (np.searchsorted(across, places + step) for step in (-half_m, half_m))
+    count = last - first
+    mean = np.where(count >= SHOULDER_SHARE * count.max(), (sums[last] - sums[first]) / np.maximum(count, 1), -np.inf)
+    return replace(points, across=points.across - places[np.argmax(mean)])
+
+
+def lengths_by_kind(heads: Sequence[HeadPoints]) -> np.ndarray:
+    """Return the lengths of lines that show sharp heads and blunt ones, (2,) metres."""
     shown_m = np.zeros(2)
     for points in heads:
         if len(points.t):
             shown_m[int(points.looks_blunt)] += np.ptp(points.t)
-    return bool(shown_m[1] > shown_m[0])
+    return shown_m
+
+
+def _are_blunt(heads: Sequence[HeadPoints]) -> bool:
+    """Return whether most of the length of lines shows blunt heads."""
+    sharp_m, blunt_m = lengths_by_kind(heads)
+    return bool(blunt_m > sharp_m)
 
 
 def free_edges(lines: Sequence[np.ndarray], head_width_m: float) -> list[np.ndarray]:

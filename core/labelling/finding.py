@@ -5,7 +5,8 @@ The files are read once; memory holds one square and its margin (docs/classifica
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -15,7 +16,8 @@ from ..classify.guide import MIDDLE_M, Guide
 from ..classify.settings import MARGIN_M, Settings, Way
 from ..classify.square import Classified, classify_square
 from ..classify.tops import LOW_M
-from ..classify.ways import search_alike
+from ..classify.ways import blunt_sources, search_alike
+from ..clouds.passes import sources_of
 from ..clouds.points import Request, read_each
 from ..clouds.readers import CloudHeader, read_points, shows_scanner
 from ..errors import CloudError, NoRailPointsError, ParameterError
@@ -28,7 +30,7 @@ from ..run.loop import Runner
 from ..run.tasks import Context, Task
 from ..standards import LAST_CLASS
 from ..tiles.grid import Key, Square, Tiling
-from ..tiles.store import SortedFile, append, counts_of, files_of, read_stored
+from ..tiles.store import SortedFile, append, counts_of, files_of, read_stored, sources_among
 
 POINT = np.dtype([("xyz", "<f8", 3), ("number", "<i8"), ("mark", "<u4")])
 """A point on disk: coordinates in units of the CRS, its number among all points of all files, and its mark, see
@@ -49,13 +51,15 @@ file states: a square of 41 m with rails has thousands of points, and each squar
 class Found:
     """The rail points of a square: `xyz`, (k, 3) in units of the CRS, and their numbers among all points of all files.
 
-    `marks`, (k,), tell their passes apart, as in `passes.marks_of`.
+    `marks`, (k,), tell their passes apart, as in `passes.marks_of`. `fills`: they are those of blunt sources, while
+    others of the cloud are sharp.
     """
 
     xyz: np.ndarray
     number: np.ndarray
     marks: np.ndarray
     figures: SearchFigures
+    fills: bool = False
 
 
 def find_rail_points(
@@ -76,20 +80,64 @@ def find_rail_points(
     if not counts:
         raise _nothing_to_search(request, settings.guide)
     progress.status("Searching for rails")
-    searched = 0
-
-    def search(keys: Sequence[Key], way: Way) -> Iterator[Found]:
-        nonlocal searched
-        own = replace(settings, way=way)
-        tasks = {key: _search_task(key, sorted_files, request.zero, own) for key in keys}
-        start, searched = searched, min(searched + len(keys), len(counts))
-        share = searching.span(start / len(counts), searched / len(counts))
-        for _, found in runner.run(tasks, share):
-            yield found
-
-    for found in search_alike(sorted(counts, key=lambda key: (-counts[key], key)), search):
+    search = Search(sorted_files, request.zero, settings, runner, searching)
+    for found in search.all():
         if found.figures != SearchFigures():
             yield found
+
+
+@dataclass
+class Search:
+    """The search of a cloud whose points are sorted into squares, as a sharp or a blunt one, or source by source."""
+
+    sorted_files: Sequence[SortedFile]
+    zero: LocalFrame
+    settings: Settings
+    runner: Runner
+    progress: Progress
+    searched: int = 0
+
+    def all(self) -> Iterator[Found]:
+        """Search all squares: if some of its sources are blunt and others sharp, each kind in its own way."""
+        counts, sources = counts_of(self.sorted_files), sources_among(self.sorted_files)
+        blunt = blunt_sources({one: _fullest(own) for one, own in sources.items()}, self._seen)
+        if not blunt:
+            yield from search_alike(_fullest(counts), self._alike)
+            return
+        for way in (Way.SHARP, Way.BLUNT):
+            is_blunt = way is Way.BLUNT
+            own = frozenset(one for one in sources if (one in blunt) == is_blunt)
+            keys = _fullest(sum((Counter(sources[one]) for one in own), Counter()))
+            tasks = {key: self._task(key, way, own) for key in keys}
+            for _, found in self.runner.run(tasks, self.progress.span(0.5 * is_blunt, 0.5 + 0.5 * is_blunt)):
+                yield replace(found, fills=True, figures=found.figures.filling) if is_blunt else found
+
+    def _seen(self, parts: Sequence[tuple[int, Key]]) -> Iterator[tuple[int, SearchFigures]]:
+        """Search squares for the rails of one source each, as if it were sharp."""
+        tasks = {part: self._task(part[1], Way.SHARP, frozenset(part[:1])) for part in parts}
+        for (source, _), found in self.runner.run(tasks, self.progress.span(0.0, 0.0)):
+            yield source, found.figures
+
+    def _alike(self, keys: Sequence[Key], way: Way) -> Iterator[Found]:
+        """Search squares for the rails of all sources."""
+        count = len(counts_of(self.sorted_files))
+        start, self.searched = self.searched, min(self.searched + len(keys), count)
+        tasks = {key: self._task(key, way) for key in keys}
+        for _, found in self.runner.run(tasks, self.progress.span(start / count, self.searched / count)):
+            yield found
+
+    def _task(self, key: Key, way: Way, sources: frozenset[int] | None = None) -> Task:
+        """Make the task that searches a square for the rails of some sources, or of all."""
+        weight = SEARCH_S * sum(one.counts.get(key, 0) for one in self.sorted_files)
+        square = Square.on_grid(key, self.settings.side_m, self.zero)
+        settings = replace(self.settings.at(key), way=way)
+        arguments = (square, files_of(key, self.sorted_files), settings, sources)
+        return Task(f"Searching square {key}", _search, arguments, weight=weight)
+
+
+def _fullest(counts: Mapping[Key, int]) -> list[Key]:
+    """List squares in the order of their numbers of points, the largest first."""
+    return sorted(counts, key=lambda key: (-counts[key], key))
 
 
 def _nothing_to_search(request: Request, guide: Guide | None) -> NoRailPointsError:
@@ -158,7 +206,7 @@ def report(figures: SearchFigures, request: Request, progress: Progress) -> None
             f"The rails have {figures.cells_per_m:.1f} cells with points per metre; below {ENOUGH_CELLS_PER_M:.0f}, "
             "lines are less accurate and may have gaps: use a denser cloud."
         )
-    if figures.blunt_m:
+    if figures.blunt_m and not figures.sharp_m:
         progress.warning(
             f"Heads are blunt on {figures.blunt_m:.0f} m of rail: the cloud blurs what it shows by "
             f"{100 * figures.blur_m:.0f} cm{_as_from_images(request)}, so that a head is a round ridge. A ridge "
@@ -199,6 +247,7 @@ def _sort_file(
     """Append the points of a file that are to be searched to the files of their squares; a task."""
     mine, tiling = SortedFile.new_folder(Path(folder)), Tiling(settings.side_m, MARGIN_M)
     counts: dict[Key, int] = {}
+    sources: dict[int, Counter[Key]] = {}
     if settings.guide is not None and not settings.guide.reaches(*box_of(request, [header.extent])):
         return SortedFile(str(mine), counts)
     for points in read_searched(request, header.path, first, context.progress, with_class):
@@ -214,9 +263,18 @@ def _sort_file(
             )
         for key, count in zip(keys, np.bincount(square).tolist()):
             counts[key] = counts.get(key, 0) + count
+        if not with_class:
+            _count_sources(sources_of(points["mark"]), keys, square, sources)
         for key, numbers in tiling.sort(places).items():
             append(mine, key, points.take(numbers))  # which is four times as fast as an index
-    return SortedFile(str(mine), counts)
+    return SortedFile(str(mine), counts, sources)
+
+
+def _count_sources(own: np.ndarray, keys: Sequence[Key], square: np.ndarray, total: dict[int, Counter[Key]]) -> None:
+    """Count points by source, (n,), and by the number of their square among keys, (n,)."""
+    for source in np.unique(own).tolist():
+        counts = np.bincount(square[own == source], minlength=len(keys)).tolist()
+        total.setdefault(source, Counter()).update({key: count for key, count in zip(keys, counts) if count})
 
 
 def read_searched(
@@ -234,17 +292,14 @@ def read_searched(
         yield points
 
 
-def _search_task(key: Key, sorted_files: Sequence[SortedFile], zero: LocalFrame, settings: Settings) -> Task:
-    """Make the task that searches a square."""
-    weight = SEARCH_S * sum(one.counts.get(key, 0) for one in sorted_files)
-    arguments = (Square.on_grid(key, settings.side_m, zero), files_of(key, sorted_files), settings.at(key))
-    return Task(f"Searching square {key}", _search, arguments, weight=weight)
-
-
-def _search(square: Square, files: Sequence[str], settings: Settings, context: Context) -> Found:
-    """Find the rail points of a square; a task."""
+def _search(
+    square: Square, files: Sequence[str], settings: Settings, sources: frozenset[int] | None, context: Context
+) -> Found:
+    """Find the rail points of a square, those of some sources if they are given; a task."""
     context.progress.check()
     points = read_stored(files, POINT)
+    if sources is not None:
+        points = points[np.isin(sources_of(points["mark"]), sorted(sources))]
     found = search_square(square.frame.to_local(points["xyz"]), settings, context)
     points = points[found.rail]
     return Found(points["xyz"].copy(), points["number"].copy(), points["mark"].copy(), found.figures)

@@ -16,20 +16,32 @@ from .. import checks
 from ..checks.doubts import doubting_scatter, strip_courses
 from ..checks.points import occupied_squares, plausible
 from ..checks.standard import warn_of_spacing
+from ..classify.ways import blunt_among
 from ..clouds.points import RailPoints
 from ..errors import NoRailPointsError, NoTrackError, RailExtractError
 from ..frpdf.models import choose
 from ..heads.strips import rows_of
 from ..parameters import ALIGNED, Parameters
 from ..progress import SILENT, Progress, Recording, counted
-from ..rails import Centerline, RailLine, RailNetwork, TrackGeometry
+from ..rails import Centerline, RailLine, RailNetwork, SearchFigures, TrackGeometry
 from ..raster import RailRaster
 from ..run.loop import Runner
 from ..run.tasks import Context, Task
 from ..squares.remeasuring import measure_rails
-from ..squares.seams import SquareRails, rows_in_frame
+from ..squares.seams import NO_KINDS, SquareRails, rows_in_frame
 from ..squares.steps import clean_square, engine_for, rails_of_square, square_side, whole_rails
-from ..tiles.grid import Key, MemorySource, PointSource, SortedPoints, Square, around, assembled
+from ..tiles.grid import (
+    Filling,
+    Key,
+    MemorySource,
+    PointSource,
+    SortedPoints,
+    Square,
+    around,
+    assembled,
+    merged,
+    parted,
+)
 from ..tracks.centerlines import tracks_of
 from ..tracks.geometry import measure_track_geometry
 from ..tracks.parallels import widths_by_gauge
@@ -137,19 +149,32 @@ def _drawn(
     cleaned: dict[int, RailRaster] = {}
     judged: list[PointSource] = []
     any_square = False
-    for source, share in zip(points.classes, progress.split(len(points.classes))):
+    shares = progress.split(len(points.classes))
+    waiting = list(zip(points.classes, shares))
+    while waiting:
+        source, share = waiting.pop(0)
+        if isinstance(source, Filling):
+            sharp = tuple(rail.xyz for rail in rails if rail.class_code == source.class_code)
+            source = replace(source, lines=sharp)
         squares = {square.key: square for square in occupied_squares(points.classes, source)}
         _announce_squares(source, squares, parameters, share)
         parts, rasters = _draw_squares(source, squares, parameters, runner, share)
+        blunt = _blunt_strips(parts)
+        if blunt:
+            share.info(f"Class {source.class_code}: sharp and blunt points are drawn apart.")
+            waiting[:0] = [(one.judged(False), share.span(1.0, 1.0)) for one in parted(source, blunt)]
+            continue
         parts, source = _drawn_alike(parts, source, squares, parameters, runner, share)
         judged.append(source)
         any_square |= bool(parts) or not squares
         strips += [rows_in_frame(part, source.frame) for part in parts]
         found = whole_rails(_released(parts), source.frame, parameters, len(rails) + 1, share) if parts else []
-        share.info(f"Class {source.class_code}: {_lengths(found, 'rail')}.")
-        rails += found
+        alone = " that only blunt points show" if source.fills else ""
+        share.info(f"Class {source.class_code}: {_lengths(found, 'rail')}{alone}.")
+        rails += [replace(rail, fills=source.fills) for rail in found]
         if rasters:
-            cleaned[source.class_code] = assembled(rasters, squares, source.frame)
+            own, before = assembled(rasters, squares, source.frame), cleaned.get(source.class_code)
+            cleaned[source.class_code] = own if before is None else merged(before, own)
     if not any_square:
         raise RailExtractError(f"Not one square could be extracted; the last error was: {runner.failures[-1]}")
     frame = points.classes[0].frame
@@ -182,7 +207,8 @@ def _announce_squares(
     source: PointSource, squares: Mapping[Key, Square], parameters: Parameters, progress: Progress
 ) -> None:
     """Say which points are processed, and with which network."""
-    points, where = counted(sum(source.counts.values()), "point"), counted(len(squares), "square")
+    what = "blunt point" if source.fills else "point"
+    points, where = counted(sum(source.counts.values()), what), counted(len(squares), "square")
     model = choose(parameters.gauge_m, parameters.head_width_m, parameters.model).name
     passes = counted(parameters.passes, "pass", "passes") if parameters.passes else "passes until it is stable"
     progress.info(f"Class {source.class_code}: {points} in {where}; network {model}, {passes}.")
@@ -213,6 +239,14 @@ def _draw_squares(
         else:
             rasters[key] = result
     return parts, rasters
+
+
+def _blunt_strips(parts: Sequence[SquareRails]) -> frozenset[int]:
+    """Return the strips that are blunt while others of the class are sharp, by the lengths that each shows."""
+    seen: dict[int, SearchFigures] = {}
+    for strip, sharp_m, round_m in np.concatenate([NO_KINDS, *(part.kinds for part in parts)]).tolist():
+        seen[int(strip)] = seen.get(int(strip), SearchFigures()) + SearchFigures(sharp_m=sharp_m, round_m=round_m)
+    return blunt_among(seen)
 
 
 def _drawn_alike(
@@ -315,10 +349,11 @@ def _measured(
     measured = measure_rails(network.rails, points.classes, heads_m, runner, remeasuring, align)
     measured = doubting_scatter(measured, beyond_m)
     geometry: list[TrackGeometry] = []
-    for source, share in zip(points.classes, stations.split(len(points.classes))):
+    codes = list(dict.fromkeys(source.class_code for source in points.classes))
+    for code, share in zip(codes, stations.split(len(codes))):
         geometry += measure_track_geometry(
-            [line for line in network.centerlines if line.class_code == source.class_code],
-            [rail for rail in measured if rail.class_code == source.class_code],
+            [line for line in network.centerlines if line.class_code == code],
+            [rail for rail in measured if rail.class_code == code],
             parameters.head_width_m,
             parameters.quality_step_m,
             share,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -26,7 +26,7 @@ from ..run.loop import Runner
 from ..run.tasks import Context
 from ..squares.steps import square_side
 from ..standards import RAIL_CLASS
-from ..tiles.grid import SortedPoints
+from ..tiles.grid import SortedPoints, parted
 from ..tiles.store import Census, SpooledFile, gather, spool_file
 
 READING = 0.25
@@ -91,25 +91,34 @@ class Raw:
     @contextmanager
     def sort(self, folder: Path, parameters: Parameters, runner: Runner, progress: Progress) -> Iterator[SortedPoints]:
         """See `Source`; the points become those of `RAIL_CLASS`."""
-        census, side_m = Census(), square_side(parameters)
+        census, side_m, blunt_marks = Census(), square_side(parameters), set[int]()
         with scratch_folder(folder) as sorted_points:
             try:
-                figures = self._find(census, side_m, sorted_points, parameters, runner, progress)
+                figures = self._find(census, blunt_marks, side_m, sorted_points, parameters, runner, progress)
             except NoRailPointsError:
                 warn_of_raw(self.request, SearchFigures(), parameters, progress)
                 raise
             is_warned = warn_of_raw(self.request, figures, parameters, progress)
-            points = _gathered(self.request, side_m, sorted_points, census, figures)
+            points = _gathered(self.request, side_m, sorted_points, census, figures, blunt_marks)
             yield replace(points, only_pairs=True, is_warned=is_warned)
 
     def _find(
-        self, census: Census, side_m: float, folder: Path, parameters: Parameters, runner: Runner, progress: Progress
+        self,
+        census: Census,
+        blunt_marks: set[int],
+        side_m: float,
+        folder: Path,
+        parameters: Parameters,
+        runner: Runner,
+        progress: Progress,
     ) -> SearchFigures:
-        """Find the points on rails and add them to those of the squares."""
+        """Find the points on rails and add them to those of the squares, and the marks of blunt ones among sharp."""
         settings = Settings(parameters.gauges_m, parameters.head_width_m, weights=self.weights)
         figures = SearchFigures()
         with writing(folder), scratch_folder(folder) as squares:
             for found in find_rail_points(self.request, settings, squares, runner, progress):
+                if found.fills:
+                    blunt_marks.update(found.marks.tolist())
                 census.add(RAIL_CLASS, found.xyz, found.marks, self.request.zero, side_m, folder)
                 figures += found.figures
         if not figures.points:
@@ -153,8 +162,18 @@ class Grown:
             yield _gathered(self.request, side_m, sorted_points, census, figures)
 
 
-def _gathered(request: Request, side_m: float, folder: Path, census: Census, figures: SearchFigures) -> SortedPoints:
-    """Return the points that were found in a raw cloud."""
+def _gathered(
+    request: Request,
+    side_m: float,
+    folder: Path,
+    census: Census,
+    figures: SearchFigures,
+    blunt_marks: Collection[int] = (),
+) -> SortedPoints:
+    """Return the points that were found in a raw cloud, and which are blunt among sharp ones, by their marks."""
     (source,) = gather(request, side_m, [SpooledFile(str(folder), census.report())])
+    if blunt_marks:
+        source = replace(source, found=True)
+        return SortedPoints(parted(source, {source.passes[mark] for mark in blunt_marks}), figures)
     blunt = True if figures.blunt_m else None  # narrow ones may have no edges either
     return SortedPoints([replace(source, found=True, blunt=blunt)], figures)

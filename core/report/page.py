@@ -251,12 +251,10 @@ def _search(found: SearchFigures | None) -> str:
         ),
     ]
     if found.blunt_m:
-        blunt = (
-            "Rails with blunt heads",
-            f"{metres(found.blunt_m)}, by {1000 * found.blur_m:.0f} mm",
-            "Beams or images blur the head to a round ridge: its width and its edges cannot be seen.",
-        )
-        rows.append(blunt)
+        meaning = "Beams or images blur the head to a round ridge: its width and its edges cannot be seen."
+        if found.sharp_m:
+            meaning += " Other sources of the cloud are sharp: blunt ones count where these show no rail."
+        rows.append(("Rails with blunt heads", f"{metres(found.blunt_m)}, by {1000 * found.blur_m:.0f} mm", meaning))
     rows = rows if found.squares else rows[:4]  # rails that grow from seeds are not searched by squares
     written = table(("Found", "", "What it means"), rows, kind="words")
     return section("Rail points in the raw cloud", written)

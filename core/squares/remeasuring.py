@@ -17,7 +17,7 @@ from ..progress import SILENT, Progress
 from ..rails import RailLine
 from ..run.loop import Runner
 from ..run.tasks import Context, Task
-from ..tiles.grid import Key, PointSource, Square, Tiling, lay_out
+from ..tiles.grid import Key, PointSource, Square, Tiling, drawn_from, lay_out
 from ..tracks.geometry import PROFILE_SIGMA_M
 
 CONTEXT_M = 10.0
@@ -107,7 +107,7 @@ def _sections(
     zero = Square.on_grid((0, 0), source.side_m, source.frame).frame.shift_to(source.frame)
     sections: dict[Key, list[Section]] = defaultdict(list)
     for number, rail in enumerate(rails):
-        if rail.class_code != source.class_code:
+        if not drawn_from(rail, source):
             continue
         stations = rail.line.resampled(LOOKUP_STEP_M)
         t = stations.t

@@ -32,6 +32,9 @@ HOLE_M = HOLE_STATIONS * CUT_STEP_M
 """Longest hole that can remain near a corner between the parts of a rail that two squares show; a longer one is filled
 by a third square."""
 
+NO_KINDS = np.empty((0, 3))
+"""Lengths by strip where there is a single one."""
+
 NO_STRIPS = np.empty((0, 7))
 """Offsets of strips where there is a single one."""
 
@@ -51,7 +54,8 @@ class SquareRails:
 
     Rails without any length inside are left out. `nodes`, (n, 2), are places where rails end on each other, `strips`,
     (k, 7), offsets of strips at places inside as in `strips.rows_of`, and `blunt` says whether the square shows blunt
-    heads; None without lines.
+    heads; None without lines. `kinds`, (n, 3), has the number of each of several strips and the lengths of the lines on
+    which it shows sharp and blunt heads, metres, where it is not known which are blunt.
     """
 
     square: Square
@@ -59,6 +63,7 @@ class SquareRails:
     nodes: np.ndarray
     strips: np.ndarray = field(default_factory=NO_STRIPS.copy)
     blunt: bool | None = None
+    kinds: np.ndarray = field(default_factory=NO_KINDS.copy)
 
 
 def trim(rails: Sequence[RailLine], square: Square, strips: np.ndarray = NO_STRIPS) -> SquareRails:

@@ -17,7 +17,7 @@ from ..frpdf.engine import Engine, make_engine
 from ..frpdf.models import choose
 from ..frpdf.weights import load_arrays
 from ..heads.elevation import ElevationParameters, elevate, flat_rail, flat_rails, numbered
-from ..heads.head_points import judged, near_lines
+from ..heads.head_points import about_crest, judged, lengths_by_kind, near_lines
 from ..heads.refinement import refine
 from ..heads.roads import onto_heads
 from ..heads.strips import measure_strips, rows_of
@@ -102,7 +102,21 @@ def rails_of_square(
         # A line may be longer than the part of it that the square shows; `whole_rails` drops the lines that are short.
         parameters = replace(parameters, min_length_m=min(parameters.min_length_m, overlap_m - HALO_M))
     rails, strips, blunt = _all_vertices(raster, source.class_code, points, parameters, progress)
-    return replace(trim(rails, square, strips), blunt=blunt)
+    found = replace(trim(rails, square, strips), blunt=blunt)
+    if points.strips is None or points.found or points.blunt is not None:
+        return found
+    return replace(found, kinds=_kinds(source, square, np.unique(points.strips), rails, parameters))
+
+
+def _kinds(
+    source: PointSource, square: Square, strips: np.ndarray, rails: Sequence[RailLine], parameters: Parameters
+) -> np.ndarray:
+    """Return how long heads look sharp and blunt in each strip of a square; see `SquareRails`."""
+    lines, rows = [rail.xyz[:, :2] for rail in rails], []
+    for strip in strips.tolist() if lines else []:
+        near = near_lines(lines, source.of_strips([strip]).near(square, 0.0).xyz, parameters.head_width_m, blunt=False)
+        rows.append([strip, *lengths_by_kind([about_crest(points) for points in near])])
+    return np.array(rows).reshape(-1, 3)
 
 
 def whole_rails(

@@ -7,7 +7,7 @@ squares share one raster grid. See docs/method.md section 7.1.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from typing import Protocol
@@ -17,7 +17,8 @@ import numpy as np
 from ..clouds.on_heads import heads_of
 from ..clouds.points import RailPoints
 from ..frame import LocalFrame
-from ..rails import SearchFigures
+from ..polyline import project
+from ..rails import RailLine, SearchFigures
 from ..raster import TILE, RailRaster
 
 OVERLAP_M = 40.0
@@ -26,6 +27,10 @@ route through a switch. Rounded up to whole tiles, it is 41 m at a gauge of 1435
 
 HALO_M = 4.0
 """Distance beyond the border of a square up to which its lines are valid; there they blend into the neighbour's."""
+
+FILLED_M = 0.3
+"""Distance from the line of sharp points within which blunt ones show the same rail: half a foot, 75 mm, blurred by
+6 cm, in a survey that is registered 10 cm aside."""
 
 Key = tuple[int, int]
 """Column (to the east) and row (to the north) of a square."""
@@ -90,8 +95,93 @@ class PointSource(Protocol):
     def judged(self, blunt: bool) -> PointSource:
         """Return the source of points that know whether their cloud blunts heads."""
 
+    @property
+    def fills(self) -> bool:
+        """Whether the lines of others come first, see `Filling`."""
+
+    def of_strips(self, strips: Collection[int], among: bool = True) -> PointSource:
+        """Return the source of the points of some strips, or if not `among` them, of the others, without the rest."""
+
     def part(self, square: Square) -> PointSource:
         """Return the source without the squares that are neither `square` nor its neighbours, where that is smaller."""
+
+
+def parted(source: PointSource, blunt: Collection[int]) -> list[PointSource]:
+    """Part the points of a class into the sharp strips and the blunt ones, given by their numbers, which fill in."""
+    return [source.of_strips(blunt, among=False), Filling(source.of_strips(blunt).judged(True))]
+
+
+def drawn_from(rail: RailLine, source: PointSource) -> bool:
+    """Return whether a rail of an extraction was drawn from the points of a source."""
+    return rail.class_code == source.class_code and rail.fills == source.fills
+
+
+@dataclass(frozen=True)
+class Filling:
+    """Blunt points of a cloud that has sharp ones as well: they show rails only where no `lines` are, a `PointSource`.
+
+    Lines, (k, 2) or (k, 3) each in the frame of the cloud, are those that the sharp points have shown.
+    """
+
+    source: PointSource
+    lines: tuple[np.ndarray, ...] = ()
+    fills = True
+
+    @property
+    def frame(self) -> LocalFrame:
+        """See `PointSource`."""
+        return self.source.frame
+
+    @property
+    def class_code(self) -> int:
+        """See `PointSource`."""
+        return self.source.class_code
+
+    @property
+    def side_m(self) -> float:
+        """See `PointSource`."""
+        return self.source.side_m
+
+    @property
+    def counts(self) -> Mapping[Key, int]:
+        """See `PointSource`; with the points beside lines."""
+        return self.source.counts
+
+    @property
+    def span_m(self) -> float:
+        """See `PointSource`."""
+        return self.source.span_m
+
+    def near(self, square: Square, margin_m: float) -> RailPoints:
+        """See `PointSource`."""
+        points = self.source.near(square, margin_m)
+        if not self.lines:
+            return points
+        shift = square.frame.shift_to(self.frame)[:2]
+        free = np.ones(len(points.xyz), dtype=bool)
+        free[project([line[:, :2] - shift for line in self.lines], points.xyz[:, :2], FILLED_M).point] = False
+        return points.kept(free)
+
+    def judged(self, blunt: bool) -> Filling:
+        """See `PointSource`; these points are known to be blunt."""
+        return self
+
+    def of_strips(self, strips: Collection[int], among: bool = True) -> Filling:
+        """See `PointSource`."""
+        return replace(self, source=self.source.of_strips(strips, among))
+
+    def part(self, square: Square) -> Filling:
+        """See `PointSource`."""
+        if square.is_whole_plane:
+            return self
+        corner = square.frame.shift_to(self.frame)[:2]
+        near = [
+            line
+            for line in self.lines
+            if (line[:, :2].max(axis=0) >= corner - 2 * self.side_m).all()
+            and (line[:, :2].min(axis=0) <= corner + 3 * self.side_m).all()
+        ]
+        return replace(self, source=self.source.part(square), lines=tuple(near))
 
 
 @dataclass(frozen=True)
@@ -111,7 +201,11 @@ class SortedPoints:
 class MemorySource:
     """Points in memory, a `PointSource`."""
 
+    fills = False
+
     def __init__(self, points: RailPoints, side_m: float) -> None:
+        self._given = points
+        self._of_strips: dict[tuple[frozenset[int], bool], MemorySource] = {}
         points = heads_of(points)
         self.frame, self.class_code, self.side_m = points.frame, points.class_code, side_m
         origin = Square.on_grid((0, 0), side_m, points.frame).frame.shift_to(points.frame)
@@ -134,6 +228,15 @@ class MemorySource:
         other = copy(self)
         other._points = replace(self._points, blunt=blunt)
         return other
+
+    def of_strips(self, strips: Collection[int], among: bool = True) -> MemorySource:
+        """See `PointSource`."""
+        key = (frozenset(strips), among)
+        if key not in self._of_strips:
+            own = np.zeros(len(self._given.xyz)) if self._given.strips is None else self._given.strips
+            chosen = self._given.kept(np.isin(own, list(strips)) == among)
+            self._of_strips[key] = MemorySource(chosen, self.side_m)
+        return self._of_strips[key]
 
     def part(self, square: Square) -> MemorySource:
         """See `PointSource`."""
@@ -252,6 +355,16 @@ def assembled(rasters: Mapping[Key, RailRaster], squares: Mapping[Key, Square], 
         for (row, column), tile in raster.tiles.items()
     }
     return replace(rasters[first], tiles=tiles, x0=float(x0), y0=float(y0))
+
+
+def merged(one: RailRaster, other: RailRaster) -> RailRaster:
+    """Combine two rasters of one frame whose grids differ by whole tiles."""
+    tiles, side_m = dict(one.tiles), TILE * one.cell_m
+    down, right = round((one.y0 - other.y0) / side_m), round((other.x0 - one.x0) / side_m)
+    for (row, column), tile in other.tiles.items():
+        key = (row + down, column + right)
+        tiles[key] = tiles[key] | tile if key in tiles else tile
+    return replace(one, tiles=tiles)
 
 
 def tiles_along(side_m: float, cell_m: float) -> int:

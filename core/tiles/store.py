@@ -12,8 +12,8 @@ import os
 import uuid
 import zlib
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -29,6 +29,9 @@ from .grid import Key, Square, Tiling, around
 
 REPORT = "report.json"
 
+POINT_BYTES = 24
+"""Bytes of a sorted point: three coordinates."""
+
 LAYOUT = 2
 """Number of the layout of sorted points, so that those of an earlier version are read again."""
 
@@ -37,11 +40,13 @@ LAYOUT = 2
 class SortedFile:
     """The points of one file of a cloud, sorted into a folder with one file per square, and their number by square.
 
-    Squares with points in their margin only have a file, too.
+    Squares with points in their margin only have a file, too. `sources` has the number of points by square for each
+    source, as of `passes.sources_of`, where this is asked for.
     """
 
     folder: str
     counts: Mapping[Key, int]
+    sources: Mapping[int, Mapping[Key, int]] = field(default_factory=dict)
 
     @classmethod
     def new_folder(cls, folder: Path) -> Path:
@@ -63,6 +68,15 @@ def append(folder: Path, key: tuple[int, ...], points: np.ndarray) -> str:
 def counts_of(found: Iterable[SortedFile]) -> Counter[Key]:
     """Return the number of points of all files by square."""
     return sum((Counter(one.counts) for one in found), Counter())
+
+
+def sources_among(found: Iterable[SortedFile]) -> dict[int, Counter[Key]]:
+    """Return the number of points of all files by source and square, in ascending order of sources."""
+    total: dict[int, Counter[Key]] = {}
+    for one in found:
+        for source, counts in one.sources.items():
+            total.setdefault(source, Counter()).update(counts)
+    return dict(sorted(total.items()))
 
 
 def files_of(key: Key, found: Iterable[SortedFile]) -> list[str]:
@@ -106,6 +120,7 @@ class SpooledPoints:
     passes: Mapping[int, int]
     found: bool = False
     blunt: bool | None = None
+    fills = False
 
     def near(self, square: Square, margin_m: float) -> RailPoints:
         """See `PointSource`."""
@@ -120,6 +135,16 @@ class SpooledPoints:
     def judged(self, blunt: bool) -> SpooledPoints:
         """See `PointSource`."""
         return replace(self, blunt=blunt)
+
+    def of_strips(self, strips: Collection[int], among: bool = True) -> SpooledPoints:
+        """See `PointSource`."""
+        files = {
+            key: tuple(file for file in own if (self.passes[_numbers(file)[-1]] in strips) == among)
+            for key, own in self.files.items()
+        }
+        files = {key: own for key, own in files.items() if own}
+        counts = {key: sum(Path(file).stat().st_size for file in own) // POINT_BYTES for key, own in files.items()}
+        return replace(self, files=files, counts=counts)
 
     def part(self, square: Square) -> SpooledPoints:
         """Keep only a square and its neighbours, so that less is sent to a worker."""

@@ -24,6 +24,7 @@ from ..scenes.adversarial import ADVERSARIAL
 from ..scenes.catalogue import SCENES
 from ..scenes.gauges import GAUGES, GaugeScene
 from ..scenes.layouts import LAYOUTS
+from ..scenes.mixed import MIXED, RAW_MIXED
 from ..scenes.raw import RawScene
 from ..scenes.raw_catalogue import AIR, RAW_SCENES
 from ..scenes.scene import Scene
@@ -37,7 +38,7 @@ from .measuring import QUALITY_STEP_M, local_sigma
 
 AnyScene = Union[Scene, RawScene, FlownScene, TrackScene, GaugeScene]
 
-DRAWN: dict[str, Callable[..., Scene]] = {**SCENES, **ADVERSARIAL, **LAYOUTS, **WHOLE}
+DRAWN: dict[str, Callable[..., Scene]] = {**SCENES, **ADVERSARIAL, **LAYOUTS, **WHOLE, **MIXED}
 """Scenes of classified points, by name."""
 
 RAW, GUIDED, FITTED, SWEPT = "raw ", "guide ", "fit ", "gauge "
@@ -45,7 +46,7 @@ RAW, GUIDED, FITTED, SWEPT = "raw ", "guide ", "fit ", "gauge "
 scenes through which a profile is swept."""
 
 SEEDED: dict[str, tuple[Callable[[int], AnyScene], int]] = {
-    **{RAW + name: (make, 2026) for name, make in RAW_SCENES.items()},
+    **{RAW + name: (make, 2026) for name, make in {**RAW_SCENES, **RAW_MIXED}.items()},
     **{GUIDED + name: (make, 3) for name, make in FLOWN.items()},
     **{FITTED + name: (make, 7) for name, make in TRACKS.items()},
     **{SWEPT + name: (make, 5) for name, make in GAUGES.items()},
@@ -59,7 +60,7 @@ QUICK = (
     *("straight", "tram", "turnout_7", "turnout_26", "crossover", "dual_gauge", "noisy", "sparse"),
     *("ballast", "platform", "gaps", "thin_points", "strips_meet", "double_slip", "three_way_apart", "side_30"),
     *("crossing", "standing_train", "grooved", "near_tracks", "flyover", "parked_train"),
-    *("whole_tenth", "whole_side", "whole_turnout"),
+    *("whole_tenth", "whole_side", "whole_turnout", "mixed_half_scanned"),
     *("raw turnout 1:9", "raw metro", "raw crossing", "raw air 80", "raw photo curve", "raw car park"),
     *(GUIDED + name for name in FLOWN),
     *(FITTED + name for name in TRACKS),

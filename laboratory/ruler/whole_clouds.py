@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import partial
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
 
 from ...core.classify.settings import MARGIN_M, Settings, Way
 from ...core.classify.square import Classified
-from ...core.classify.ways import search_alike
+from ...core.classify.ways import blunt_sources, search_alike
 from ...core.grow.heads import GrowSettings, OnHeads, Rail
 from ...core.labelling.finding import search_square
 from ...core.progress import SILENT, Progress
@@ -26,26 +28,42 @@ class Part(NamedTuple):
     figures: SearchFigures
 
 
-def classify_cloud(xyz: np.ndarray, settings: Settings, progress: Progress = SILENT) -> Classified:
-    """Find the points on railheads in a cloud of any size, (n, 3).
+def classify_cloud(
+    xyz: np.ndarray, settings: Settings, progress: Progress = SILENT, sources: np.ndarray | None = None
+) -> Classified:
+    """Find the points on railheads in a cloud of any size, (n, 3), of several sources, (n,) whole numbers, or of one.
 
     Metres count from the zero of the coordinate system, so that the squares do not depend on how files are cut. With a
     guide, only points near it are given.
     """
     rail = np.zeros(len(xyz), dtype=bool)
     figures = SearchFigures()
-    keys, square = Tiling(settings.side_m).keys(xyz)
-    context = Context({}, Once(), progress)
+    own = np.zeros(len(xyz), dtype=int) if sources is None else sources
+    context, mixed = Context({}, Once(), progress), False
     around_them = Tiling(settings.side_m, MARGIN_M).sort(xyz)
 
-    def search(some: Sequence[Key], way: Way) -> Iterator[Part]:
+    def search(some: Sequence[Key], way: Way, which: np.ndarray) -> Iterator[Part]:
         for key in progress.follow(some):
-            number = around_them[key]
+            number = around_them[key][which[around_them[key]]]
             corner = np.array([*np.multiply(key, settings.side_m), 0.0])
             found = search_square(xyz[number] - corner, replace(settings.at(key), way=way), context)
-            yield Part(number[found.rail], found.figures)
+            yield Part(number[found.rail], found.figures.filling if way is Way.BLUNT and mixed else found.figures)
 
-    for part in search_alike([keys[place] for place in np.argsort(-np.bincount(square), kind="stable")], search):
+    def seen(some: Sequence[tuple[int, Key]]) -> Iterator[tuple[int, SearchFigures]]:
+        for source, key in some:
+            yield from ((source, part.figures) for part in search([key], Way.SHARP, own == source))
+
+    def fullest(which: np.ndarray) -> list[Key]:
+        keys, square = Tiling(settings.side_m).keys(xyz[which])
+        return [keys[place] for place in np.argsort(-np.bincount(square), kind="stable")]
+
+    blunt = blunt_sources({source: fullest(own == source) for source in np.unique(own).tolist()}, seen)
+    mixed = bool(blunt)
+    every, filling = np.ones(len(xyz), dtype=bool), np.isin(own, sorted(blunt))
+    parts = [search_alike(fullest(every), partial(search, which=every))]
+    if mixed:
+        parts = [search(fullest(which), way, which) for way, which in ((Way.SHARP, ~filling), (Way.BLUNT, filling))]
+    for part in chain(*parts):
         rail[part.number] = True
         figures += part.figures
     return Classified(rail, figures)

@@ -80,7 +80,7 @@ def thing(make: Callable[..., None], *args: object) -> Thing:
 def double_track(
     seed: int,
     scanner: Scanning = TRAIN,
-    second: RawScanner | None = None,
+    second: Scanning | None = None,
     name: str = "double",
     curvature: float = 1 / 700,
     cant_m: float = 0.09,

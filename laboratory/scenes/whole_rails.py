@@ -51,6 +51,7 @@ def classified(scene: RawScene, share: float = 1.0, train_share: float = 0.0, se
         scene.standard,
         scene.frame,
         scene.other_gauges_m,
+        strips=scene.strips,
     )
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from rail_extract.core.classify.settings import Settings, Way
 from rail_extract.core.classify.square import classify_square
-from rail_extract.core.classify.ways import is_blunt, search_alike
+from rail_extract.core.classify.ways import blunt_among, blunt_sources, is_blunt, search_alike
 from rail_extract.core.rails import SearchFigures
 from rail_extract.laboratory.ruler.classification import lines_from, score, settings_of
 from rail_extract.laboratory.ruler.whole_clouds import classify_cloud
@@ -115,3 +115,39 @@ def test_heads_just_above_the_ballast_are_flat(share, found_m):
     figures = [classify_square(xyz, Settings((1.435,), 0.072, way=way)).figures for way in (Way.SHARP, Way.FILLED)]
     assert figures[0].paired_m == 0
     assert figures[1].paired_m == figures[1].filled_m == pytest.approx(found_m, abs=1.0)
+
+
+SHARP, ROUND, NOTHING = (30.0, 2.0), (0.5, 60.0), (0.0, 0.0)
+"""Lengths of sharp and of round rails in a part of a cloud."""
+
+
+@pytest.mark.parametrize(
+    ("sources", "blunt", "searched"),
+    [
+        ({1: [SHARP] * 9}, set(), 0),
+        ({1: [SHARP] * 9, 2: [SHARP] * 9}, set(), 2),
+        ({1: [ROUND] * 9, 2: [ROUND] * 9}, set(), 4),
+        ({1: [SHARP] * 9, 2: [ROUND] * 9}, {2}, 3),
+        ({1: [NOTHING] * 3 + [SHARP], 2: [ROUND] * 2, 3: [NOTHING] * 5}, {2}, 4 + 2 + 5),
+        ({1: [SHARP], 2: [ROUND]}, set(), 2),
+    ],
+)
+def test_sources_are_blunt_among_sharp_ones_only_if_both_are_certain(sources, blunt, searched):
+    asked = []
+
+    def search(parts):
+        asked.extend(parts)
+        return [(one, SearchFigures(sharp_m=sharp_m, round_m=round_m)) for one, (sharp_m, round_m) in parts]
+
+    assert blunt_sources(sources, search) == blunt
+    assert len(asked) == searched
+
+
+def test_passes_of_one_wide_beam_are_of_one_kind():
+    """World 263: one pass shows round rails only, the others both kinds."""
+    assert not blunt_among({3: SearchFigures(round_m=110.5), 5: SearchFigures(sharp_m=33.0, round_m=34.6)})
+
+
+def test_a_source_that_shows_little_is_not_called_blunt():
+    figures = {1: SearchFigures(sharp_m=500.0), 2: SearchFigures(round_m=99.0), 3: SearchFigures(round_m=101.0)}
+    assert blunt_among(figures) == {3}

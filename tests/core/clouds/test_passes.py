@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from rail_extract.core.clouds.passes import marks_of, number_passes
+from rail_extract.core.clouds.passes import marks_of, number_passes, sources_of
 from rail_extract.core.clouds.points import ask, read_rail_points
 from rail_extract.core.tiles.grid import Square
 from rail_extract.core.tiles.store import spool
@@ -86,3 +86,12 @@ def test_files_and_sorted_files_agree_on_passes(tmp_path, source_id):
     near = source.near(Square((0, 0), points.frame, np.inf), 0.0)
     order, other = (np.lexsort(one.xyz.T) for one in (points, near))
     np.testing.assert_array_equal(near.strips[other], points.strips[order])
+
+
+def test_a_source_is_an_id_at_all_times_and_points_without_times_are_of_another():
+    times = np.arange(0.0, 1800.0, 30.0)
+    scanned = [sources_of(marks_of(np.full(len(times), one, np.uint16), 0, START + times)) for one in (0, 7)]
+    images = [sources_of(marks_of(np.full(3, one, np.uint16), 0, None)) for one in (0, 7)]
+    found = [set(one.tolist()) for one in (*scanned, *images)]
+    assert [len(one) for one in found] == [1, 1, 1, 1]
+    assert len(set.union(*found)) == 4

@@ -1,7 +1,8 @@
 """Which points belong to which line."""
 
 import numpy as np
-from rail_extract.core.heads.head_points import near_lines
+import pytest
+from rail_extract.core.heads.head_points import about_crest, lengths_by_kind, near_lines
 
 WIDTH = 0.072
 
@@ -17,3 +18,22 @@ def test_points_belong_to_the_nearest_line_in_order_along_it():
     assert not one.free[1].any() and one.free[0].all() and not other.free[0].any()
     assert one.within(0.3).tolist() == [False, True]
     assert one[one.within(0.3)].strips.tolist() == [4]
+
+
+@pytest.mark.parametrize("aside_m", [-0.035, 0.0, 0.03])
+def test_strips_show_what_they_are_beside_a_line_that_several_show(aside_m):
+    """Ridges of images and heads of a scanner, registered apart, along one line of 50 m."""
+    rng = np.random.RandomState(5)
+    x, y = rng.uniform(0, 50, 4000), rng.uniform(-0.12, 0.12, 4000)
+    ridge = np.column_stack([x, y, 0.12 * np.exp(-0.5 * ((y - aside_m) / 0.06) ** 2) + rng.normal(0, 0.006, 4000)])
+    head = np.column_stack([x, aside_m + 0.3 * y, rng.normal(0, 0.003, 4000)])
+    kinds = [
+        lengths_by_kind([about_crest(one) for one in near_lines([np.array([[0.0, 0.0], [50.0, 0.0]])], xyz, WIDTH)])
+        for xyz in (head, ridge)
+    ]
+    np.testing.assert_allclose(kinds, [[50, 0], [0, 50]], atol=0.5)
+
+
+def test_a_strip_without_points_is_of_no_kind():
+    empty = near_lines([np.array([[0.0, 0.0], [50.0, 0.0]])], np.empty((0, 3)), WIDTH, blunt=False)
+    assert lengths_by_kind([about_crest(one) for one in empty]).tolist() == [0, 0]

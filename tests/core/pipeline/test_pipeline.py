@@ -311,3 +311,53 @@ def test_the_progress_rises_to_the_end_and_cleaning_has_its_share_of_it(monkeypa
     assert sum(cleaning) == pytest.approx(share * 0.9, abs=1e-9)
     assert (np.diff(heard.fractions) >= -1e-12).all()
     assert min(heard.fractions) >= 0.0 and heard.fractions[-1] == max(heard.fractions) == 1.0
+
+
+def scanned_and_surveyed(scanned_m=60.0, imaged=True):
+    """A track of 60 m that a scanner shows from its start on, and images, 3 cm aside and lower, throughout."""
+    rng, spacing_m = np.random.RandomState(4), 1.435 + WIDTH
+    x, y, left = rng.uniform(0, scanned_m, 9000), rng.uniform(-0.5, 0.5, 9000) * WIDTH, rng.randint(2, size=9000)
+    parts = [np.column_stack([x, y + spacing_m * left, rng.normal(0, 0.002, 9000)])]
+    if imaged:
+        x, y, left = rng.uniform(0, 60, 6000), rng.uniform(-0.12, 0.12, 6000), rng.randint(2, size=6000)
+        z = 0.12 * np.exp(-0.5 * (y / 0.06) ** 2) - 0.16 + rng.normal(0, 0.004, 6000)
+        parts.append(np.column_stack([x, y + spacing_m * left + 0.03, z]))
+    strips = np.repeat([5, 6], [9000, 6000])[: sum(map(len, parts))]
+    return RailPoints(np.concatenate(parts), LocalFrame(np.zeros(3)), 10, strips if imaged else None)
+
+
+def test_images_do_not_move_the_lines_of_a_scanner():
+    parameters = Parameters(1.435, WIDTH, engine="OPENCV")
+    both = extract_rails([scanned_and_surveyed()], parameters)
+    alone = extract_rails([scanned_and_surveyed(imaged=False)], parameters)
+    assert len(both.rails) == len(alone.rails) == 2
+    for one, other in zip(both.rails, alone.rails):
+        np.testing.assert_array_equal(one.xyz, other.xyz)
+        assert (one.sigma_mm, one.sigmaz_mm) == (other.sigma_mm, other.sigmaz_mm)
+    assert both.warnings == alone.warnings
+
+
+def test_images_show_the_rails_where_the_scanner_does_not():
+    both = extract_rails([scanned_and_surveyed(25.0)], Parameters(1.435, WIDTH, engine="OPENCV", quality_step_m=1.0))
+    alone = extract_rails([scanned_and_surveyed(25.0, imaged=False)], Parameters(1.435, WIDTH, engine="OPENCV"))
+    sharp, blunt = ([rail for rail in both.rails if rail.fills == fills] for fills in (False, True))
+    assert [rail.xyz.tolist() for rail in sharp] == [rail.xyz.tolist() for rail in alone.rails]
+    assert len(blunt) == 2
+    for rail in blunt:
+        assert rail.xyz[:, 0].min() < 26 and rail.xyz[:, 0].max() > 59
+        left_m = 1.507 * (rail.xyz[0, 1] > 0.7) + 0.03
+        assert np.abs(rail.xyz[:, 1] - left_m).max() < 0.01
+        assert rail.sigma_mm > 2 * max(one.sigma_mm for one in sharp)
+    (track,) = both.centerlines
+    assert track.length_m > 58
+    (geometry,) = both.geometry
+    assert len(geometry.chainage_m) == pytest.approx(track.length_m, abs=2)
+    said = [warning for warning in both.warnings if "Where only blunt ones show a rail, on " in warning]
+    assert float(said[0].split("a rail, on ")[1].split(" m")[0]) == pytest.approx(70, abs=2)
+
+
+def test_both_parts_of_a_class_are_in_its_cleaned_raster():
+    both = extract_rails([scanned_and_surveyed(25.0)], Parameters(1.435, WIDTH, engine="OPENCV", keep_cleaned=True))
+    (raster,) = both.cleaned
+    along = raster.to_local(raster.cells())[:, 0]
+    assert all(np.count_nonzero((along > start) & (along < start + 5)) > 200 for start in range(0, 60, 5))

@@ -1,15 +1,20 @@
 """Rail points found in raw clouds and sorted into squares: what is said where there are none."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from rail_extract.core.clouds.points import ask
 from rail_extract.core.errors import NoRailPointsError, RailExtractError
 from rail_extract.core.parameters import Parameters
+from rail_extract.core.pipeline import extract_files
 from rail_extract.core.pipeline.sources import Raw
 from rail_extract.core.progress import SILENT
 from rail_extract.core.run.loop import Answer, InTurn, Runner
 from rail_extract.core.standards import SEARCHED_CLASSES
 from rail_extract.laboratory.scenes.las import write_las
+from rail_extract.laboratory.scenes.mixed import mixed
+from rail_extract.laboratory.scenes.write import write_raw
 
 PARAMETERS = Parameters(1.435, 0.072)
 
@@ -38,3 +43,29 @@ def test_a_cloud_that_could_not_be_searched_is_not_called_empty(tmp_path, execut
         pass
     assert [one.name for one in tmp_path.iterdir()] == ["raw.las"]
     assert (type(error.value) is NoRailPointsError) == (kind is NoRailPointsError)
+
+
+def test_blunt_sources_of_a_raw_cloud_are_searched_and_drawn_apart(tmp_path):
+    """A scanner and images in files without ids: only the scanner has times."""
+    scene = mixed(3, scanned=0.5)
+    files = []
+    for number in (0, 1):
+        own = scene.passes == number
+        part = replace(
+            scene, xyz=scene.xyz[own], kind=scene.kind[own], strips=None, times=1000 + np.arange(own.sum()) / 5e5
+        )
+        files.append(tmp_path / f"{number}.laz")
+        write_raw(replace(part, classification=np.ones(own.sum(), np.uint8) if number else None), files[-1])
+    scanner, both = (extract_files(asked(*some), tmp_path, PARAMETERS, Runner()) for some in (files[:1], files))
+    sharp, blunt = ([rail for rail in both.rails if rail.fills == fills] for fills in (False, True))
+    shift = both.frame.shift_to(scanner.frame)
+    for one, other in zip(sharp, scanner.rails):
+        np.testing.assert_allclose(one.xyz + shift, other.xyz, rtol=0, atol=1e-5)
+    assert len(sharp) == len(scanner.rails) == len(blunt) == 4
+    assert sum(rail.length_m for rail in blunt) == pytest.approx(119, abs=2)
+    assert both.search.paired_m == scanner.search.paired_m
+    assert both.search.blunt_m == pytest.approx(240, abs=2)
+
+
+def asked(*files):
+    return Raw(ask(files, SEARCHED_CLASSES, None, None, SILENT))

@@ -1,16 +1,21 @@
 """Squares: independent of the files of a cloud, on one raster grid."""
 
+from dataclasses import replace
+
 import numpy as np
 from rail_extract.core.clouds.points import RailPoints
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.raster import TILE, rasterize
 from rail_extract.core.tiles.grid import (
+    Filling,
     MemorySource,
     Square,
     assembled,
     lay_out,
+    merged,
     mosaic,
     own_tiles,
+    parted,
 )
 
 CELL = 0.04
@@ -75,3 +80,38 @@ def test_a_mosaic_contains_the_tiles_of_the_neighbours():
     expected = rasterize(source.near(squares[key], SIDE - 1e-6).xyz, CELL)
     assert set(seen.tiles) == set(expected.tiles)
     assert all((seen.tiles[place] == expected.tiles[place]).all() for place in seen.tiles)
+
+
+def test_blunt_strips_show_only_what_the_lines_of_others_leave():
+    points = replace(cloud(), strips=np.arange(4000) % 3)
+    sharp, blunt = parted(MemorySource(points, SIDE), [1])
+    assert (sharp.fills, blunt.fills) == (False, True)
+    assert sum(blunt.counts.values()) == np.count_nonzero(points.strips == 1)
+    assert sum(sharp.counts.values()) + sum(blunt.counts.values()) == 4000
+    slope = np.array([1.0, 0.4])
+    line = np.append(np.array([[20.0], [90.0]]) * slope + [0.1, -0.05], [[3.0], [3.0]], axis=1)
+    filling = replace(blunt, lines=(line,))
+    left = []
+    for square in lay_out([sharp, filling], filling):
+        shift = square.frame.shift_to(FRAME)
+        part = filling.part(square)
+        assert part.near(square, 5.0).xyz.tolist() == filling.near(square, 5.0).xyz.tolist()
+        assert part.near(square, 0.0).blunt
+        left.append(filling.near(square, 0.0).xyz + shift)
+    along = np.sort(np.concatenate(left)[:, 0])
+    own = points.xyz[points.strips == 1]
+    np.testing.assert_allclose(along, np.sort(own[(own[:, 0] < 20.08) | (own[:, 0] > 90.08), 0]), atol=0.05)
+
+
+def test_rasters_of_both_parts_of_a_class_are_one():
+    points = replace(cloud(), strips=np.repeat([1, 2], 2000))
+    zero = Square.on_grid((0, 0), SIDE, FRAME).frame.shift_to(FRAME)
+    rasters = []
+    for source in parted(MemorySource(points, SIDE), [2]):
+        assert isinstance(source, (MemorySource, Filling))
+        squares = {square.key: square for square in lay_out([source], source)}
+        own = {key: own_tiles(rasterize(source.near(one, 0.0).xyz, CELL), one) for key, one in squares.items()}
+        rasters.append(assembled(own, squares, FRAME))
+    whole = rasterize(points.xyz - zero, CELL)
+    places = np.sort(merged(*rasters).to_local(merged(*rasters).cells()), axis=0)
+    np.testing.assert_allclose(places, np.sort(whole.to_local(whole.cells()) + zero[:2], axis=0), atol=1e-6)

@@ -269,3 +269,18 @@ def test_a_part_without_points_counts_nothing(tmp_path):
     assert census.report()["classes"] == {}
     census.add(10, np.ones((2, 3)), np.zeros(2, dtype=int), frame, SIDE, tmp_path)
     assert list(census.report()["classes"]) == ["10"]
+
+
+def test_the_points_of_some_strips_are_the_same_on_disk_and_in_memory(tmp_path):
+    along = np.random.RandomState(0).uniform(0, 100, 3000)
+    xyz = np.column_stack([500_000 + along, 5_400_000 - 0.7 * along, np.full(3000, 300.0)])
+    ids = np.random.RandomState(1).choice(np.array([4, 7, 9], np.uint16), 3000)
+    file = write_las(tmp_path / "strips.laz", xyz, offsets=CORNER, classification=10, point_source_id=ids)
+    (spooled,), (points,) = spool(ask([file], [10]), SIDE, tmp_path), read_rail_points([file], [10])
+    memory = MemorySource(points, SIDE)
+    for among in (True, False):
+        one, two = spooled.of_strips([4, 9], among), memory.of_strips([4, 9], among)
+        assert one.counts == two.counts
+        assert sum(one.counts.values()) == np.count_nonzero(np.isin(ids, [4, 9]) == among)
+        for square in lay_out([one], one):
+            assert len(one.near(square, 7.0).xyz) == len(two.near(square, 7.0).xyz)

@@ -13,6 +13,7 @@ from rail_extract.core.polyline import length_along
 from rail_extract.laboratory.curves import Element, trace, transition_curve
 from rail_extract.laboratory.scenes.catalogue import SCENES
 from rail_extract.laboratory.scenes.frogs import FLANGEWAY_M, laid_together
+from rail_extract.laboratory.scenes.mixed import IMAGED, SCANNED, mixed
 from rail_extract.laboratory.scenes.scanner import Scanner, head_outline, scan
 from rail_extract.laboratory.scenes.scene import RAIL
 from rail_extract.laboratory.scenes.tracks import Track
@@ -152,3 +153,15 @@ def test_bad_arguments_end_in_one_sentence(tmp_path, capsys, arguments, sentence
     assert commands.main(["scenes", *arguments, "--into", str(tmp_path / "out")]) == 1
     assert sentence in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
+
+
+def test_a_mixed_cloud_has_its_rails_where_each_source_shows_them():
+    scene = mixed(3, scanned=0.5, imaged=0.75)
+    along = {one: scene.xyz[scene.strips == one] @ [np.cos(0.35), np.sin(0.35), 0] for one in (SCANNED, IMAGED)}
+    lengths = {one: np.ptp(np.percentile(own, (0.1, 99.9))) for one, own in along.items()}
+    assert lengths[SCANNED] == pytest.approx(30, abs=4) and lengths[IMAGED] == pytest.approx(45, abs=4)
+    first, second = scene.rails[:4], scene.rails[4:]
+    for sharp, blunt in zip(first, second):
+        assert length_along(sharp[:, :2])[-1] == pytest.approx(length_along(blunt[:, :2])[-1], abs=0.7)
+        step = blunt[0] - sharp[-1]
+        assert 0.01 < np.hypot(*step[:2]) < 0.2 and -0.06 < step[2] < 0.0
