@@ -15,9 +15,9 @@ from ..progress import counted, metres, written
 from .clearance_pictures import RULES, cross_section, diagram
 from .clearance_remarks import cannot_be_judged
 from .clearance_slices import Slice
-from .markup import figure, made, note, page, section, table, tag, tiles, verdict_box
+from .markup import figure, legend, made, note, page, section, table, tag, tiles, verdict_box
 from .page import stated
-from .plots import Curve, Panel, broken, draw_panels
+from .plots import Curve, MapTrack, Panel, broken, draw_panels, draw_plan
 
 NOTES = (
     "This is a screening and no proof of conformity. The standard error holds the fit of the object's surface, the "
@@ -35,6 +35,14 @@ WIRE_LIMITS = (
     "(Regulation (EU) 1301/2014, table 4.2.9.1); at least 4950 mm at 15 kV and 5020 mm at 25 kV (EBO annex 3)."
 )
 
+KEYS = (
+    ("free", {"class_": "fine"}),
+    ("too few points", {"class_": "unsupported"}),
+    ("in doubt", {"class_": "unsure"}),
+    ("surely inside the profile", {"class_": "offgauge"}),
+)
+"""Legend of the map; its numbers are those of the tracks."""
+
 LEAST_SPAN_MM = 20.0
 """Smallest range of a panel, so that noise does not look alarming."""
 
@@ -51,6 +59,7 @@ def clearance_page(found: Clearance, worst: Sequence[Slice], source: str, facts:
         source,
         verdict_box(kind, words, found.warnings),
         _tiles(found),
+        section("Map", draw_plan([_course(found, number) for number in range(len(found.courses))]), legend(KEYS)),
         *(diagram(found, number) for number in range(len(found.courses))),
         *_cross_sections(found, worst),
         *_intrusions(found),
@@ -119,6 +128,19 @@ def _tiles(found: Clearance) -> str:
         (metres(sum(one.length_m for one in found.courses)), "of track"),
     )
     return tiles(figures)
+
+
+def _course(found: Clearance, number: int) -> MapTrack:
+    """Return a track for the map, with the stretches that are inside the profile on top."""
+    stations = found.stations[number]
+    marks = {"unsupported": found.unseen(stations)}
+    for name, sure in (("unsure", False), ("offgauge", True)):
+        marks[name] = np.zeros(len(stations.s), dtype=bool)
+        for one in found.intrusions:
+            if one.course == number and not one.what and one.sure == sure:
+                first, last = np.searchsorted(stations.s, [one.from_m, one.to_m])
+                marks[name][max(first - 1, 0) : last + 1] = True
+    return MapTrack(str(stations.course.track_id), stations.xyz, marks)
 
 
 def _cross_sections(found: Clearance, worst: Sequence[Slice]) -> Iterator[str]:

@@ -61,3 +61,11 @@ def test_the_page_states_profile_and_cross_section(measured):
     assert "no proof of conformity" in page
     assert len(summary(found)) == 2
     assert np.isfinite(found.least_margin_m)
+
+
+@pytest.mark.parametrize(("depth_m", "marked"), [(0.050, True), (-0.100, False)])
+def test_the_map_marks_the_stretch_inside(measured, depth_m, marked):
+    found = measured(depth_m)
+    page = clearance_page(found, (), "cloud.laz", {})
+    plan = page[page.index('aria-label="Map of the tracks"') :]
+    assert ('class="offgauge mark"' in plan[: plan.index("</svg>")]) == marked
