@@ -60,6 +60,9 @@ FACES_PERCENT, MIN_ON_FACES = (20.0, 80.0), 10
 """Percentiles of the offsets of the points on faces that tell both edges of a head, or twice the one that is seen; of
 five points, one may be a stray."""
 
+WIDEST_M = 0.08
+"""Distance of the faces of the widest head, 78 mm; those of two heads, as in switches, are further apart."""
+
 FOUND_HEAD_M, FOUND_SIGMAS = 0.036, 5.0
 """Depth below the crown of what was found in a raw cloud, and standard deviations of the noise if they are more, as in
 clouds from the air. The search takes all of the web down to 50 mm below the top where a rail is seen from the side; few
@@ -240,7 +243,7 @@ def _crowns(place: np.ndarray, across: np.ndarray, z: np.ndarray, places: int) -
 def _faces(place: np.ndarray, across: np.ndarray, depth_m: np.ndarray, places: int) -> np.ndarray:
     """Return the offsets of the right and the left face of the heads of places, (p, 2) metres, NaN where none is seen.
 
-    Where one face is seen, both are that one.
+    Where one face is seen, both are that one; two heads side by side show none that is certain.
     """
     on = (depth_m > FACE_M[0]) & (depth_m <= FACE_M[1])
     place, across = place[on], across[on]
@@ -250,6 +253,7 @@ def _faces(place: np.ndarray, across: np.ndarray, depth_m: np.ndarray, places: i
     edges = np.full((places, 2), np.nan)
     for column, percent in enumerate(FACES_PERCENT):
         edges[seen, column] = across[first[seen] + np.rint(percent / 100 * (count[seen] - 1)).astype(int)]
+    edges[edges[:, 1] - edges[:, 0] > WIDEST_M] = np.nan
     return edges
 
 

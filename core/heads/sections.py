@@ -27,6 +27,12 @@ above at one end and at 40° at the other."""
 PULL_DOUBT = 0.3
 """Standard error of that displacement, as a share of it: the same branches."""
 
+SHAPE_SIGMA_M = 0.0006
+"""Standard error of the axis by the shape of a head: it is worn more on one side, and edges that are hardly seen blend
+with what is beside them. All places of a rail share it, however many points there are. Measured over 18 random worlds
+of mobile scanners: without it, 49 % of the errors were within the standard error and 75 % within twice it, with it 64
+and 89 %."""
+
 CHANGE_SIGMAS = 1.0
 """Change of that share, in standard errors, that counts as chance."""
 
@@ -188,7 +194,7 @@ def outline_middles(points: HeadPoints, seen: np.ndarray) -> Middles:
             middles.offset[part] = np.where(seen[part], offset - pull, np.nan)
         if not is_flat:
             middles.top[part] = np.where(seen[part], level[part] + above, np.nan)
-        middles.common[part] = np.hypot(scores.common_m[0], PULL_DOUBT * pull)
+        middles.common[part] = np.sqrt(scores.common_m[0] ** 2 + (PULL_DOUBT * pull) ** 2 + SHAPE_SIGMA_M**2)
         middles.top_common[part] = scores.common_m[1]
         on_crown = np.abs(left[here] - section.place[0]) < FLAT_SHARE * head_width_m
         middles.blur_up[part] = apart_m = _half_apart(_above_crown(left[here], up[here], section.place)[on_crown])

@@ -34,7 +34,7 @@ def test_labels_of_everything_score_badly(plain, monkeypatch):
     from rail_extract.laboratory.ruler import classification
 
     everything = Classified(np.ones(len(plain.xyz), dtype=bool), SearchFigures())
-    monkeypatch.setattr(classification, "classify_cloud", lambda *_: everything)
+    monkeypatch.setattr(classification, "classify_cloud", lambda *_, **__: everything)
     result, _ = score(plain)
     assert result.recall == 1.0
     assert result.precision < 0.1
