@@ -131,7 +131,7 @@ def _tiles(found: Clearance) -> str:
 
 
 def _course(found: Clearance, number: int) -> MapTrack:
-    """Return a track for the map, with the stretches that are inside the profile on top."""
+    """Return a track for the map, with the sections that are inside the profile on top."""
     stations = found.stations[number]
     marks = {"unsupported": found.unseen(stations)}
     for name, sure in (("unsure", False), ("offgauge", True)):
