@@ -10,7 +10,7 @@ from ..progress import Progress
 from ..rails import RailNetwork
 from ..tiles.grid import SortedPoints, drawn_from
 from .doubts import doubting_jumps, doubting_scatter, gauge_scatter, warn_of_strips
-from .lines import warn_of_filled, warn_of_rails, warn_of_split_classes, with_tracks
+from .lines import warn_of_blunt_lines, warn_of_rails, warn_of_split_classes, with_tracks
 from .points import warn_of_airborne, warn_of_unexplained
 from .standard import head_widths
 
@@ -25,7 +25,7 @@ def of(
     for source in points.classes:
         own = [rail for rail in network.rails if drawn_from(rail, source)]
         if source.fills:
-            warn_of_filled(own, progress)
+            warn_of_blunt_lines(own, progress)
             continue
         warn_of_rails(own, source.class_code, parameters, progress, points.search is not None)
         if own:

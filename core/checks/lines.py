@@ -90,7 +90,7 @@ def _near(line: np.ndarray, places: np.ndarray) -> bool:
     return bool((places[:, :2].min(axis=0) < high).all() and (places[:, :2].max(axis=0) > low).all())
 
 
-def warn_of_filled(rails: Sequence[RailLine], progress: Progress) -> None:
+def warn_of_blunt_lines(rails: Sequence[RailLine], progress: Progress) -> None:
     """Warn the user of rails that only blunt points of a cloud show which has sharp ones as well."""
     if rails:
         length_m = sum(rail.length_m for rail in rails)

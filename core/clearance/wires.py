@@ -22,8 +22,8 @@ GROUPS, THICK_M, WIDE_M, LEAST_POINTS = 4, 0.04, 0.06, 2
 number of points."""
 
 BESIDE_M, BESIDE_UP_M = (0.08, 0.40), 0.06
-"""Aside and in height: where there are no more points than in a group. A wire is thin: roofs, beams and leaves are
-none."""
+"""Aside and in height: where there are no more points than in a group, because a wire is thin, unlike roofs, beams and
+leaves."""
 
 TRIES = 12
 """Places at which a group is looked for in a piece; a roof has points at every height."""
@@ -55,7 +55,7 @@ JUMP_M = 0.10, 0.06
 """Change across and in height between pieces at which a wire breaks: ten times that of the steepest one."""
 
 LONGEST_GAP_M, SHORTEST_M = 8.0, 10.0
-"""A longer gap parts wires; shorter wires are none."""
+"""Longest gap within a wire, and the least length of one."""
 
 GRADE_M = 20.0
 """Length over which the gradient is measured."""

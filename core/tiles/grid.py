@@ -28,7 +28,7 @@ route through a switch. Rounded up to whole tiles, it is 41 m at a gauge of 1435
 HALO_M = 4.0
 """Distance beyond the border of a square up to which its lines are valid; there they blend into the neighbour's."""
 
-FILLED_M = 0.3
+SAME_RAIL_M = 0.3
 """Distance from the line of sharp points within which blunt ones show the same rail: half a foot, 75 mm, blurred by
 6 cm, in a survey that is registered 10 cm aside."""
 
@@ -159,7 +159,7 @@ class Filling:
             return points
         shift = square.frame.shift_to(self.frame)[:2]
         free = np.ones(len(points.xyz), dtype=bool)
-        free[project([line[:, :2] - shift for line in self.lines], points.xyz[:, :2], FILLED_M).point] = False
+        free[project([line[:, :2] - shift for line in self.lines], points.xyz[:, :2], SAME_RAIL_M).point] = False
         return points.kept(free)
 
     def judged(self, blunt: bool) -> Filling:

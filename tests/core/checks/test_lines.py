@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from heard import Heard
-from rail_extract.core.checks.lines import displacement, warn_of_filled, warn_of_rails, with_tracks
+from rail_extract.core.checks.lines import displacement, warn_of_blunt_lines, warn_of_rails, with_tracks
 from rail_extract.core.parameters import Parameters
 from rail_extract.core.rails import Centerline, RailLine
 from rail_extract.laboratory.curves import Element, trace
@@ -126,7 +126,7 @@ def test_a_corner_that_no_rail_has_does_not_cause_a_warning_about_the_default():
 
 def test_the_user_is_told_how_much_only_blunt_points_show():
     heard = Heard()
-    warn_of_filled([], heard)
+    warn_of_blunt_lines([], heard)
     assert not heard.warnings
-    warn_of_filled([rail(1, line(0.75, 0.0)), rail(2, line(-0.75, 0.0))], heard)
+    warn_of_blunt_lines([rail(1, line(0.75, 0.0)), rail(2, line(-0.75, 0.0))], heard)
     assert len(heard.warnings) == 1 and "on 120 m" in heard.warnings[0]

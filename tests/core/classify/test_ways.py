@@ -99,19 +99,21 @@ def test_a_blunt_cloud_is_blunt_everywhere():
     assert figures.blunt_m > 200
 
 
-def filled_track(share: float) -> np.ndarray:
-    """Two heads 3 cm above ballast of 900 points per square metre; a share of their points is on top, others below."""
+def filled_track(share: float, per_m2: int) -> np.ndarray:
+    """Two heads 3 cm above ballast, with points per square metre; a share of those of heads is on top, others below."""
     rng = np.random.RandomState(6)
-    xy = rng.uniform(0.0, 16.0, (16 * 16 * 900, 2))
+    xy = rng.uniform(0.0, 16.0, (16 * 16 * per_m2, 2))
     on = np.abs(np.abs(xy[:, 0] - 7.0) - (1.435 + 0.072) / 2) < 0.036
     top = on & (rng.uniform(size=len(xy)) < share)
     z = np.where(top, 0.03, 0.008 * rng.standard_normal(len(xy))) + 0.003 * rng.standard_normal(len(xy))
     return np.column_stack([xy, z])
 
 
-@pytest.mark.parametrize(("share", "found_m"), [(1.0, 2 * 16.0), (0.3, 0.0)])
-def test_heads_just_above_the_ballast_are_flat(share, found_m):
-    xyz = filled_track(share)
+@pytest.mark.parametrize(
+    ("share", "per_m2", "found_m"), [(1.0, 900, 2 * 16.0), (0.3, 900, 0.0), (0.45, 3000, 0.0), (1.0, 250, 0.0)]
+)
+def test_heads_just_above_the_ballast_are_flat(share, per_m2, found_m):
+    xyz = filled_track(share, per_m2)
     figures = [classify_square(xyz, Settings((1.435,), 0.072, way=way)).figures for way in (Way.SHARP, Way.FILLED)]
     assert figures[0].paired_m == 0
     assert figures[1].paired_m == figures[1].filled_m == pytest.approx(found_m, abs=1.0)
