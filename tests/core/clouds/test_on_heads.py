@@ -37,8 +37,10 @@ def test_what_is_below_a_head_is_left_out(gradient, noise_m):
 @given(st.integers(20, 400), st.floats(0.0, 0.006), st.integers(0, 2**32 - 1))
 @settings(max_examples=20, deadline=None)
 def test_heads_alone_are_kept(per_m, noise_m, seed):
+    """All but the few points that noise puts below them: one in 2,000 at 6 mm, and at times two of a hundred."""
     xyz, part = rail(12.0, per_m, seed, noise_m)
-    assert on_heads(xyz[part == HEAD]).mean() >= 0.99
+    head = xyz[part == HEAD]
+    assert len(head) - on_heads(head).sum() <= 3 + 0.002 * len(head)
 
 
 def test_a_rail_far_beside_the_scanner_shows_its_web_as_well_as_its_head():
