@@ -360,6 +360,9 @@ class StripCourse:
     up_mm: np.ndarray
 
 
+HALF_TRACK_M = 1.0
+"""Distance from a centerline within which its rails are: half of the widest gauge and a head."""
+
 STRIP_OFF_M = 0.003
 """Distance between strips from which the user is warned. Strips of one scanner that agree differ by a millimetre."""
 

@@ -311,3 +311,14 @@ def _check(quantity: str, value_mm: float, allowed_mm: tuple[float, float]) -> N
         raise ParameterError(
             f"A {quantity} of {value_mm:g} mm is not possible: give millimetres from {lowest:g} to {highest:g}."
         )
+
+
+def width_at(spacing_m: float, gauges: Sequence[Gauge]) -> float:
+    """Return the width of the railheads of a track whose rails are at a distance, that of the nearest gauge, metres.
+
+    Examples
+    --------
+    >>> width_at(1.061, [(1.435, 0.072), (1.0, 0.066)])
+    0.066
+    """
+    return min(gauges, key=lambda one: abs(sum(one) - spacing_m))[1]

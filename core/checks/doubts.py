@@ -6,7 +6,7 @@ and 6.11.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -14,9 +14,9 @@ from scipy.ndimage import uniform_filter1d
 
 from ..heads.head_points import STATION_STEP_M
 from ..parameters import ALIGNED, Parameters
-from ..polyline import Polyline, interpolate, project
+from ..polyline import Polyline, interpolate
 from ..progress import SILENT, Progress
-from ..rails import STRIP_OFF_M, Centerline, RailLine, StripCourse, Support
+from ..rails import HALF_TRACK_M, STRIP_OFF_M, Centerline, RailLine, Support
 
 ARM_M, CORE_M = 5.0, 1.0
 """Length of the track on either side of a place that shows a step, and half the length in the middle that is left out:
@@ -35,11 +35,6 @@ STEP_SIGMAS, STEP_GAIN = 5.0, 2.75
 """Standard errors from which a step is not chance, and the standard error of a step relative to that of its line, whose
 errors are correlated over about a metre."""
 
-REACH_M = 1.0
-"""Distance from a centerline within which its rails are: half of the widest gauge and a head."""
-
-STEP_M = 1.0
-"""Length over which the offsets on both rails are averaged."""
 
 MIN_STRIPS_APART_M = 5.0
 """Length of rail on which strips are apart from which the user is warned; they are compared over twice this length."""
@@ -81,7 +76,7 @@ def _shown(line: Polyline, t: np.ndarray, side: Sequence[tuple[np.ndarray, Suppo
     found = np.full((3, len(t)), np.nan)
     for xyz, support in side:
         places, *shown = _steps_along(xyz[:, :2], support)
-        feet = line.feet(places, REACH_M)
+        feet = line.feet(places, HALF_TRACK_M)
         for row, column in zip(found, shown):
             if len(feet.t) > 1:
                 here = np.interp(t, feet.t, column[feet.point], left=np.nan, right=np.nan)
@@ -127,7 +122,7 @@ def doubting_jumps(
 def _doubting(rail: RailLine, found: Sequence[tuple[np.ndarray, float]]) -> RailLine:
     """Add half of the nearest step, given the places on the centerline and the sizes, to the error of a rail."""
     support = rail.support
-    feet = rail.line.feet(np.array([place for place, _ in found]), REACH_M)
+    feet = rail.line.feet(np.array([place for place, _ in found]), HALF_TRACK_M)
     if support is None or not len(feet.t):
         return rail
     nearest = np.argmin(np.abs(support.t[:, None] - feet.t), axis=1)
@@ -174,28 +169,6 @@ def _weights() -> tuple[np.ndarray, np.ndarray]:
         arm = used & (side * t > 0)
         bends[arm] = side * np.linalg.pinv(np.stack([t**0, t, t**2 / 2], axis=1)[arm])[-1]
     return steps, bends
-
-
-def strip_courses(centerlines: Sequence[Centerline], rows: np.ndarray) -> tuple[StripCourse, ...]:
-    """Describe the offsets of strips along tracks, given `heads.strips.rows_of` in their frame, (k, 7)."""
-    lines = [one.xyz[:, :2] for one in centerlines]
-    feet = project(lines, rows[:, :2], REACH_M)
-    return tuple(
-        course
-        for number, one in enumerate(centerlines)
-        for course in _courses(one, feet.of(number).t, rows[feet.of(number).point])
-    )
-
-
-def _courses(centerline: Centerline, t: np.ndarray, rows: np.ndarray) -> Iterator[StripCourse]:
-    """Average the offsets of each strip along one track."""
-    normals = interpolate(centerline.line.normals, centerline.line.t, t)
-    across = np.einsum("ij,ij->i", rows[:, 3:5], normals)
-    for strip in np.unique(rows[:, 2]):
-        mine = rows[:, 2] == strip
-        step, number, count = np.unique(np.floor(t[mine] / STEP_M), return_inverse=True, return_counts=True)
-        means = [1000 * np.bincount(number, values[mine]) / count for values in (across, rows[:, 5])]
-        yield StripCourse(centerline.track_id, int(strip), (step + 0.5) * STEP_M, *means)
 
 
 def warn_of_strips(rails: Sequence[RailLine], parameters: Parameters, progress: Progress) -> None:

@@ -15,20 +15,25 @@ from ..classify.settings import Settings, Way
 from ..classify.square import classify_square
 from ..classify.ways import search_alike
 from ..clouds.points import Request
-from ..errors import CloudError, ParameterError
+from ..errors import ParameterError
 from ..heads.head_points import judged
 from ..heads.roads import MIN_WIDER_M
 from ..heads.sections import likelier_width
 from ..parameters import Parameters
 from ..progress import SILENT, Progress
 from ..rails import HEAD_OFF_M, HeadWidths, RailLine, SearchFigures
-from ..standards import HEAD_WIDTH_RANGE_MM, SAME_GAUGE_M, STANDARDS, Gauge, RailStandard, closest_standard, of_gauge
-from ..tiles.grid import PointSource
-from ..tracks.parallels import width_at
-from .points import Spacings, fullest_square, measure_spacings
-
-SAMPLE_M = 50.0
-"""Half the side of the area whose points show the width of the heads."""
+from ..standards import (
+    HEAD_WIDTH_RANGE_MM,
+    SAME_GAUGE_M,
+    STANDARDS,
+    Gauge,
+    RailStandard,
+    closest_standard,
+    of_gauge,
+    width_at,
+)
+from ..tiles.grid import PointSource, fullest_square
+from .spacing import Spacings, in_words, measure_spacings, middle, question, warn_of_other_spacing
 
 TABLES_DIFFER_M = 0.002
 """By which tables state different widths of one head, and worn heads differ: no measurement tells standards apart that
@@ -52,9 +57,6 @@ ties and sides of the track make pairs of a few metres."""
 
 RAW_HEAD_M = 0.070
 """Width of a head that differs by less than 13 mm from that of any standard: heads are found 25 mm wider as well."""
-
-FEET = (0.3048, 1 / 0.3048)
-"""Factors by which coordinates are wrong if feet are stated as metres, or metres as feet."""
 
 
 def detect_standard(request: Request, progress: Progress = SILENT) -> RailStandard:
@@ -87,7 +89,7 @@ def warn_of_raw(request: Request, found: SearchFigures, parameters: Parameters, 
         return False
     progress.status("Looking for rails of other gauges")
     rails, paired_m = _found_at_any_gauge(request, progress.span(0, 0))
-    return paired_m > MANY_TIMES * found.paired_m and _warn_of_spacing(rails, parameters, progress)
+    return paired_m > MANY_TIMES * found.paired_m and warn_of_other_spacing(rails, parameters, progress)
 
 
 def _found_at_any_gauge(request: Request, progress: Progress) -> tuple[np.ndarray, float]:
@@ -149,7 +151,7 @@ def _detected(spacings: Spacings, progress: Progress) -> RailStandard:
     measured = spacings.most_common()
     standard = closest_standard(*measured) if measured else None
     if measured is None or standard is None:
-        found = "" if measured is None else f": rails are {_in_words(*measured)}"
+        found = "" if measured is None else f": rails are {in_words(*measured)}"
         raise ParameterError(
             f"No rail standard could be detected{found}: choose STANDARD, or fill in GAUGE and HEAD_WIDTH."
         )
@@ -173,7 +175,7 @@ def _detected(spacings: Spacings, progress: Progress) -> RailStandard:
 def _assumed(standard: RailStandard, measured: tuple[float, float], progress: Progress) -> RailStandard:
     """Say that a standard is assumed by the distance of the rails alone, and offer the one that fits this best."""
     progress.warning(
-        f"Rails are {_in_words(*measured)}. No standard has such heads: the cloud is blunt, or has more than heads. "
+        f"Rails are {in_words(*measured)}. No standard has such heads: the cloud is blunt, or has more than heads. "
         f"{standard.label} ({standard.name}) is assumed, as its rails are this far apart; if the profile is another "
         "one, choose it as STANDARD."
     )
@@ -182,55 +184,6 @@ def _assumed(standard: RailStandard, measured: tuple[float, float], progress: Pr
     if closest != standard:
         progress.propose(closest.name)
     return standard
-
-
-def warn_of_gauge(request: Request, parameters: Parameters, progress: Progress) -> bool:
-    """Warn the user at once if the first points show another gauge: the run takes minutes until no track is found.
-
-    Returns whether the user has been warned.
-    """
-    try:
-        sample = request.sample()[0]
-    except CloudError:
-        return False  # reported when the points are sorted
-    return _warn_of_spacing(sample, parameters, progress)
-
-
-def warn_of_spacing(source: PointSource, parameters: Parameters, progress: Progress) -> bool:
-    """Warn the user of another gauge as `warn_of_gauge` does, by the points of one class, as found in a raw cloud."""
-    return _warn_of_spacing(_middle(fullest_square(source).xyz), parameters, progress)
-
-
-def _warn_of_spacing(xyz: np.ndarray, parameters: Parameters, progress: Progress) -> bool:
-    """Warn the user if rail points, (n, 3) in metres, show another gauge; return whether they do."""
-    spacings = measure_spacings(xyz)
-    measured = spacings.most_common()
-    spacings_m, tolerance_m = [sum(one) for one in parameters.gauges], parameters.centerline_tolerance_m
-    if any(spacings.include(one, tolerance_m) for one in spacings_m):
-        return False
-    for factor, stated, real in zip(FEET, ("metres", "feet"), ("feet", "metres")):
-        if _is_off_by(factor, xyz, spacings_m, parameters):
-            progress.warning(
-                f"Rails are {1 / factor:.3g} times as far apart as the gauge: the coordinates are said to be {stated}, "
-                f"are these {real}? Assign a coordinate system that says so."
-            )
-            return True
-    if measured is None:
-        return False
-    expected = 1000 * (parameters.gauge_m + parameters.head_width_m)
-    progress.warning(f"Rails are {_in_words(*measured)}; {expected:.0f} mm apart are expected{_question(*measured)}")
-    standard = closest_standard(*measured)
-    if standard is not None:
-        progress.propose(standard.name)
-    return True
-
-
-def _is_off_by(factor: float, xyz: np.ndarray, spacings_m: Sequence[float], parameters: Parameters) -> bool:
-    """Return whether rails are at a gauge, with heads of the stated width, once coordinates are multiplied."""
-    measured = measure_spacings(factor * xyz).most_common()
-    if measured is None or abs(measured[1] - parameters.head_width_m) > 2 * HEAD_OFF_M:
-        return False
-    return min(abs(measured[0] - one) for one in spacings_m) <= parameters.centerline_tolerance_m
 
 
 def head_widths(
@@ -247,7 +200,7 @@ def head_widths(
         strips, counts = np.unique(points.strips, return_counts=True)
         points = points.kept(points.strips == strips[np.argmax(counts)])
     xyz = points.xyz
-    measured = measure_spacings(_middle(xyz)).most_common()
+    measured = measure_spacings(middle(xyz)).most_common()
     lines = [rail.xyz[:, :2] - points.frame.shift_to(source.frame)[:2] for rail in rails]
     stated_m = gauges[0][1] if measured is None else width_at(measured[0], gauges)
     if judged(points, lines, stated_m).blunt:
@@ -286,26 +239,9 @@ def _warn_of_widths(widths: HeadWidths, spacing_m: float, gauges: Sequence[Gauge
         )
     elif fits or seen_m < stated_m:
         if any(abs(spacing_m - seen_m - gauge_m) <= SAME_GAUGE_M for gauge_m, _ in gauges):
-            progress.warning(f"{seen}{_question(spacing_m, seen_m)} Every gauge is off by the difference.")
+            progress.warning(f"{seen}{question(spacing_m, seen_m)} Every gauge is off by the difference.")
     else:
         progress.warning(
             f"{seen}, and no standard has such heads: passes of the scanner are not aligned, or the points are noisy. "
             "Passes can be compared and aligned (STRIPS) if the points have source ids or GPS times."
         )
-
-
-def _middle(xyz: np.ndarray) -> np.ndarray:
-    """Return the points around the middle one."""
-    place = xyz[np.argmin(np.abs(xyz[:, :2] - np.median(xyz[:, :2], axis=0)).max(axis=1)), :2]
-    return xyz[np.abs(xyz[:, :2] - place).max(axis=1) <= SAMPLE_M]
-
-
-def _question(spacing_m: float, head_width_m: float) -> str:
-    """End a sentence with the question for the standard that fits what was measured, if one does."""
-    standard = closest_standard(spacing_m, head_width_m)
-    return f": is it {standard.label} ({standard.name})?" if standard else "."
-
-
-def _in_words(spacing_m: float, head_width_m: float) -> str:
-    """State what was measured."""
-    return f"{1000 * spacing_m:.0f} mm apart, with heads {1000 * head_width_m:.0f} mm wide"

@@ -6,7 +6,7 @@ passes show a rail, or one passes on to the next, their difference is seen. See 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,15 +15,16 @@ from scipy.ndimage import maximum_filter1d, minimum_filter1d, uniform_filter1d
 from scipy.sparse.linalg import spsolve
 
 from ..parameters import Parameters
-from ..polyline import Polyline, distance_to, interpolate
-from ..rails import Support
+from ..polyline import Polyline, distance_to, interpolate, project
+from ..rails import HALF_TRACK_M, Centerline, StripCourse, Support
 from .edges import edge_middles
 from .head_points import HeadPoints
 from .sections import head_noise
 from .top import find_top
 
 STEP_M = 1.0
-"""Spacing of the stations at which strips are compared: four of the windows in which edges are looked for."""
+"""Spacing of the stations at which strips are compared, and averaged over both rails: four of the windows in which
+edges are looked for."""
 
 MIN_IN_STEP = 5
 """Points on top of the head that show a strip at a station; fewer may be stray points."""
@@ -346,3 +347,25 @@ def rows_of(lines: Sequence[np.ndarray], offsets: Sequence[StripOffsets | None])
         columns = places[station], own.strips[strip], shift, own.up[strip, station], own.points[strip, station]
         rows.append(np.column_stack(columns))
     return np.concatenate(rows)
+
+
+def strip_courses(centerlines: Sequence[Centerline], rows: np.ndarray) -> tuple[StripCourse, ...]:
+    """Describe the offsets of strips along tracks, given `heads.strips.rows_of` in their frame, (k, 7)."""
+    lines = [one.xyz[:, :2] for one in centerlines]
+    feet = project(lines, rows[:, :2], HALF_TRACK_M)
+    return tuple(
+        course
+        for number, one in enumerate(centerlines)
+        for course in _courses(one, feet.of(number).t, rows[feet.of(number).point])
+    )
+
+
+def _courses(centerline: Centerline, t: np.ndarray, rows: np.ndarray) -> Iterator[StripCourse]:
+    """Average the offsets of each strip along one track."""
+    normals = interpolate(centerline.line.normals, centerline.line.t, t)
+    across = np.einsum("ij,ij->i", rows[:, 3:5], normals)
+    for strip in np.unique(rows[:, 2]):
+        mine = rows[:, 2] == strip
+        step, number, count = np.unique(np.floor(t[mine] / STEP_M), return_inverse=True, return_counts=True)
+        means = [1000 * np.bincount(number, values[mine]) / count for values in (across, rows[:, 5])]
+        yield StripCourse(centerline.track_id, int(strip), (step + 0.5) * STEP_M, *means)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -46,11 +46,10 @@ def measure_rails(
     """
     measured, widths_m = list(rails), np.broadcast_to(head_width_m, len(rails))
     for source, share in zip(sources, progress.split(len(sources))):
-        squares = {square.key: square for square in lay_out(sources, source)}
-        sections = _sections(rails, source, squares)
+        squares, sections = _sections(rails, source, sources)
         tasks = {}
         for key in sorted(sections):
-            square = squares.setdefault(key, Square.on_grid(key, source.side_m, source.frame))
+            square = squares[key]
             pieces = tuple(_with_context(rails[one[0]], one, square, source) for one in sections[key])
             label = f"Measuring the rails of class {source.class_code} in square {key}"
             own = widths_m[[number for number, _, _ in sections[key]]]
@@ -100,9 +99,10 @@ def _straight_across_gaps(rail: RailLine) -> RailLine:
 
 
 def _sections(
-    rails: Sequence[RailLine], source: PointSource, squares: Mapping[Key, Square]
-) -> dict[Key, list[Section]]:
+    rails: Sequence[RailLine], source: PointSource, sources: Sequence[PointSource]
+) -> tuple[dict[Key, Square], dict[Key, list[Section]]]:
     """Divide the rails of a class among the squares that they cross; the sections of a rail follow without gaps."""
+    squares = {square.key: square for square in lay_out(sources, source)}
     whole = next((key for key, square in squares.items() if square.is_whole_plane), None)
     zero = Square.on_grid((0, 0), source.side_m, source.frame).frame.shift_to(source.frame)
     sections: dict[Key, list[Section]] = defaultdict(list)
@@ -120,4 +120,5 @@ def _sections(
                 start = 0.0 if first == 0 else 0.5 * (t[first - 1] + t[first])
                 end = t[-1] if last == len(t) - 1 else 0.5 * (t[last] + t[last + 1])
                 sections[key].append((number, float(start), float(end)))
-    return sections
+                squares.setdefault(key, Square.on_grid(key, source.side_m, source.frame))
+    return squares, sections

@@ -29,7 +29,7 @@ from ..parameters import ALIGNED, Parameters
 from ..progress import SILENT, Progress
 from ..rails import RailLine
 from ..raster import TILE, RailRaster, cell_size, rasterize
-from ..tiles.grid import HALO_M, OVERLAP_M, Key, PointSource, Square, mosaic, own_tiles
+from ..tiles.grid import HALO_M, OVERLAP_M, Key, PointSource, Square, around
 from ..tracks.parallels import widths_by_gauge
 from ..vectorize import vectorize
 from .seams import SquareRails, join, trim
@@ -214,3 +214,62 @@ def _numbered(rails: Sequence[RailLine], parameters: Parameters, first_id: int, 
     """Finish rails and number them from `first_id`."""
     whole = finished(rails, parameters, progress)
     return [replace(rail, rail_id=number) for number, rail in enumerate(whole, start=first_id)]
+
+
+def own_tiles(raster: RailRaster, square: Square) -> RailRaster:
+    """Keep the tiles of a raster that are in the square."""
+    if square.is_whole_plane:
+        return raster
+    count = tiles_along(square.side_m, raster.cell_m)
+    inside = {
+        (row, column): tile for (row, column), tile in raster.tiles.items() if -count <= row < 0 and 0 <= column < count
+    }
+    return replace(raster, tiles=inside)
+
+
+def mosaic(rasters: Mapping[Key, RailRaster], square: Square, margin: int) -> RailRaster:
+    """Combine the raster of a square with `margin` tiles of its neighbours' around it.
+
+    Each raster has its origin at the corner of its own square; that of a neighbour may be missing.
+    """
+    own = rasters[square.key]
+    if square.is_whole_plane:
+        return own
+    count, tiles = tiles_along(square.side_m, own.cell_m), {}
+    for key in around(square.key):
+        down, right = -count * (key[1] - square.key[1]), count * (key[0] - square.key[0])
+        for (row, column), tile in rasters[key].tiles.items() if key in rasters else ():
+            place = (row + down, column + right)
+            if -count - margin <= place[0] < margin and -margin <= place[1] < count + margin:
+                tiles[place] = tile
+    return replace(own, tiles=tiles)
+
+
+def assembled(rasters: Mapping[Key, RailRaster], squares: Mapping[Key, Square], frame: LocalFrame) -> RailRaster:
+    """Combine the rasters of all squares into one in a local frame."""
+    first = min(rasters)
+    if squares[first].is_whole_plane:
+        return rasters[first]
+    count = tiles_along(squares[first].side_m, rasters[first].cell_m)
+    x0, y0, _ = squares[first].frame.shift_to(frame)
+    tiles = {
+        (row - count * (key[1] - first[1]), column + count * (key[0] - first[0])): tile
+        for key, raster in rasters.items()
+        for (row, column), tile in raster.tiles.items()
+    }
+    return replace(rasters[first], tiles=tiles, x0=float(x0), y0=float(y0))
+
+
+def merged(one: RailRaster, other: RailRaster) -> RailRaster:
+    """Combine two rasters of one frame whose grids differ by whole tiles."""
+    tiles, side_m = dict(one.tiles), TILE * one.cell_m
+    down, right = round((one.y0 - other.y0) / side_m), round((other.x0 - one.x0) / side_m)
+    for (row, column), tile in other.tiles.items():
+        key = (row + down, column + right)
+        tiles[key] = tiles[key] | tile if key in tiles else tile
+    return replace(one, tiles=tiles)
+
+
+def tiles_along(side_m: float, cell_m: float) -> int:
+    """Return the number of raster tiles along the side of a square."""
+    return round(side_m / (TILE * cell_m))

@@ -19,7 +19,7 @@ from ..clouds.points import RailPoints
 from ..frame import LocalFrame
 from ..polyline import project
 from ..rails import RailLine, SearchFigures
-from ..raster import TILE, RailRaster
+from ..raster import ROW
 
 OVERLAP_M = 40.0
 """Width of the surroundings from which the lines of a square are drawn: that much of a line is needed to decide its
@@ -31,6 +31,15 @@ HALO_M = 4.0
 SAME_RAIL_M = 0.3
 """Distance from the line of sharp points within which blunt ones show the same rail: half a foot, 75 mm, blurred by
 6 cm, in a survey that is registered 10 cm aside."""
+
+WINDOW_M, MIN_IN_WINDOW = 4.0, 10
+"""A point with fewer points than this in its cell of the window's size and the eight around it belongs to no rail: the
+shortest rail that is drawn, 1 m with 20 points per metre, has twice as many."""
+
+
+MAX_CHECKED = 20_000
+"""Squares with more points than this are not checked for strays: these would be ten points per window everywhere."""
+
 
 Key = tuple[int, int]
 """Column (to the east) and row (to the north) of a square."""
@@ -313,60 +322,45 @@ def lay_out(sources: Sequence[PointSource], source: PointSource) -> list[Square]
     return [Square.on_grid(key, source.side_m, source.frame) for key in sorted(source.counts)]
 
 
-def own_tiles(raster: RailRaster, square: Square) -> RailRaster:
-    """Keep the tiles of a raster that are in the square."""
-    if square.is_whole_plane:
-        return raster
-    count = tiles_along(square.side_m, raster.cell_m)
-    inside = {
-        (row, column): tile for (row, column), tile in raster.tiles.items() if -count <= row < 0 and 0 <= column < count
-    }
-    return replace(raster, tiles=inside)
+def occupied_squares(sources: Sequence[PointSource], source: PointSource) -> list[Square]:
+    """List the squares of one of the sources in which rails can be; see `grid.lay_out`."""
+    return [
+        square
+        for square in lay_out(sources, source)
+        if square.is_whole_plane or source.counts[square.key] > MAX_CHECKED or not _holds_only_strays(source, square)
+    ]
 
 
-def mosaic(rasters: Mapping[Key, RailRaster], square: Square, margin: int) -> RailRaster:
-    """Combine the raster of a square with `margin` tiles of its neighbours' around it.
+def fullest_square(source: PointSource) -> RailPoints:
+    """Return the points of the square of a class that has the most."""
+    return source.near(fullest(source)[0], 0.0)
 
-    Each raster has its origin at the corner of its own square; that of a neighbour may be missing.
+
+def fullest(source: PointSource) -> list[Square]:
+    """List the squares of a class in the order of their numbers of points, the largest first."""
+    return sorted(lay_out([source], source), key=lambda square: -source.counts.get(square.key, 0))
+
+
+def _holds_only_strays(source: PointSource, square: Square) -> bool:
+    """Return whether no point of a square has company, be it across the border."""
+    if sum(source.counts.get(key, 0) for key in around(square.key)) < MIN_IN_WINDOW:
+        return True
+    xyz = source.near(square, 2 * WINDOW_M).xyz
+    number, company = company_of(xyz, WINDOW_M, 1)
+    return not (company[number][square.holds(xyz)] >= MIN_IN_WINDOW).any()
+
+
+def company_of(xyz: np.ndarray, side_m: float, rings: int) -> tuple[np.ndarray, np.ndarray]:
+    """Count points, (n, 3), by cells of a side; points in the `rings` of cells around a cell count as well.
+
+    Returns the number of the cell of each point, (n,), and the points in each cell and its rings, (m,).
     """
-    own = rasters[square.key]
-    if square.is_whole_plane:
-        return own
-    count, tiles = tiles_along(square.side_m, own.cell_m), {}
-    for key in around(square.key):
-        down, right = -count * (key[1] - square.key[1]), count * (key[0] - square.key[0])
-        for (row, column), tile in rasters[key].tiles.items() if key in rasters else ():
-            place = (row + down, column + right)
-            if -count - margin <= place[0] < margin and -margin <= place[1] < count + margin:
-                tiles[place] = tile
-    return replace(own, tiles=tiles)
-
-
-def assembled(rasters: Mapping[Key, RailRaster], squares: Mapping[Key, Square], frame: LocalFrame) -> RailRaster:
-    """Combine the rasters of all squares into one in a local frame."""
-    first = min(rasters)
-    if squares[first].is_whole_plane:
-        return rasters[first]
-    count = tiles_along(squares[first].side_m, rasters[first].cell_m)
-    x0, y0, _ = squares[first].frame.shift_to(frame)
-    tiles = {
-        (row - count * (key[1] - first[1]), column + count * (key[0] - first[0])): tile
-        for key, raster in rasters.items()
-        for (row, column), tile in raster.tiles.items()
-    }
-    return replace(rasters[first], tiles=tiles, x0=float(x0), y0=float(y0))
-
-
-def merged(one: RailRaster, other: RailRaster) -> RailRaster:
-    """Combine two rasters of one frame whose grids differ by whole tiles."""
-    tiles, side_m = dict(one.tiles), TILE * one.cell_m
-    down, right = round((one.y0 - other.y0) / side_m), round((other.x0 - one.x0) / side_m)
-    for (row, column), tile in other.tiles.items():
-        key = (row + down, column + right)
-        tiles[key] = tiles[key] | tile if key in tiles else tile
-    return replace(one, tiles=tiles)
-
-
-def tiles_along(side_m: float, cell_m: float) -> int:
-    """Return the number of raster tiles along the side of a square."""
-    return round(side_m / (TILE * cell_m))
+    columns, rows = np.floor(xyz[:, :2] / side_m).astype(np.int64).T
+    cells, number, counts = np.unique(rows * ROW + columns, return_inverse=True, return_counts=True)
+    company = np.zeros(len(cells), dtype=np.int64)
+    for down in range(-rings, rings + 1):
+        for right in range(-rings, rings + 1):
+            other = cells + down * ROW + right
+            place = np.minimum(np.searchsorted(cells, other), len(cells) - 1)
+            company += np.where(cells[place] == other, counts[place], 0)
+    return number.ravel(), company

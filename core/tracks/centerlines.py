@@ -22,19 +22,16 @@ from ..parameters import Parameters
 from ..polyline import MIN_RING_M, Polyline
 from ..progress import SILENT, Progress
 from ..rails import Centerline, RailLine
-from ..standards import closest_standard, distinct_gauges
-from .chaining import TrackChain, chain_pairs, runs_on, single_rail_limit
+from ..standards import distinct_gauges
+from .chaining import PROVISIONAL_STEP_M, TrackChain, chain_pairs, provisional_centerline, runs_on, single_rail_limit
 from .midline import (
     MAX_OFFSET_M,
-    PROVISIONAL_STEP_M,
     Side,
     at_gauge,
     bridged_steps,
     midway,
-    provisional_centerline,
 )
-from .pairing import MIN_SECTION_M, pair_rails
-from .parallels import most_common_spacing
+from .pairing import pair_rails, refuse_other_spacing
 
 STATION_M = 0.5
 """Spacing of the stations that are searched for the track that an end may have left."""
@@ -263,7 +260,7 @@ def build_centerlines(
     rails = _in_order(rails)
     pairs = pair_rails(rails, parameters, other_spacings_m, progress.span(0.0, 0.5))
     if not pairs:
-        _refuse_other_spacing(rails, parameters)
+        refuse_other_spacing(rails, parameters)
     chains = chain_pairs(rails, pairs, parameters.max_gap_m, parameters.centerline_tolerance_m)
     drawn = [_draw(rails, chain, parameters) for chain in progress.span(0.5, 0.95).follow(chains)]
     kept = [line for line in drawn if line is not None and line.length_m >= parameters.min_length_m]
@@ -276,19 +273,6 @@ def _in_order(rails: Sequence[RailLine]) -> list[RailLine]:
     """Sort rails by place and turn them to start in the west: tracks must not depend on the order of the rails."""
     turned = [rail.reversed() if rail.line.starts_at_its_end else rail for rail in rails]
     return started_abreast(sorted(turned, key=lambda rail: (*rail.xyz[0, :2], *rail.xyz[-1, :2], rail.length_m)))
-
-
-def _refuse_other_spacing(rails: Sequence[RailLine], parameters: Parameters) -> None:
-    """Raise NoTrackError if the spacing of the rails clearly differs from the one given."""
-    gauge_m, head_width_m = parameters.gauge_m, parameters.head_width_m
-    spacing = most_common_spacing(rails, MIN_SECTION_M)
-    if spacing is None or abs(spacing - gauge_m - head_width_m) < parameters.centerline_tolerance_m:
-        return
-    message = f"No track of {1000 * gauge_m:.0f} mm gauge found: rails are {1000 * spacing:.0f} mm apart"
-    likely = closest_standard(spacing, head_width_m)
-    if likely is not None and abs(likely.gauge_m - gauge_m) > 1e-9:
-        raise NoTrackError(f"{message}, is the gauge {1000 * likely.gauge_m:.0f} mm?")
-    raise NoTrackError(f"{message}.")
 
 
 def _draw(rails: Sequence[RailLine], chain: TrackChain, parameters: Parameters) -> Centerline | None:

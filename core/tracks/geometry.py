@@ -14,9 +14,9 @@ from ..lines.smoothing import smooth_line, smooth_profile
 from ..polyline import Polyline, distance_to
 from ..progress import SILENT, Progress
 from ..rails import Centerline, RailLine, TrackGeometry, cell_borders
-from ..standards import Gauge
+from ..standards import Gauge, width_at
 from .midline import Meeting, Side, bridged_steps
-from .parallels import most_common_spacing, width_at
+from .parallels import most_common_spacing
 
 MEETING_STEP_M = 0.25
 """Spacing of the stations at which both rails are met."""
@@ -110,12 +110,15 @@ def _measure(line: Centerline, track_rails: _TrackRails, head_width_m: float, st
     gauge = np.hypot(left.distance_m + right.distance_m, np.nan_to_num(cant)) - head_width_m
     strips = np.stack([_strips(rails, left), _strips(rails, right)])
     at = _nearest(along, chainage)
+    borders = cell_borders(chainage)
+    cells = np.stack([borders[:-1], borders[1:]])
+    points = _whole(_points(rails, left, along, cells) + _points(rails, right, along, cells))
+    sigma_m = _sigma_of_both(rails, left, right, strips[:, :, 2])
+    sigmaz_m = _height_sigma_of_both(rails, left, right)
+    bridged = np.concatenate([[0.0], np.cumsum(bridged_steps(rails, left, right, along))])
     twist_at = np.add.outer(0.5 * TWIST_BASE_M * np.array([-1, 1]), chainage)
     behind, ahead = _profile(along, cant, twist_at.ravel()).reshape(2, -1)
     reached = (twist_at[0] >= 0) & (twist_at[1] <= along[-1])
-    bridged = np.concatenate([[0.0], np.cumsum(bridged_steps(rails, left, right, along))])
-    borders = cell_borders(chainage)
-    cells = np.stack([borders[:-1], borders[1:]])
     return TrackGeometry(
         track_id=line.track_id,
         xyz=line.line.at(chainage),
@@ -125,12 +128,12 @@ def _measure(line: Centerline, track_rails: _TrackRails, head_width_m: float, st
         twist_mm=1000 * np.where(reached, ahead - behind, np.nan),
         radius_m=_radius(line.xyz[:, :2], chainage),
         grade_pm=_grade(along, fine[:, 2], chainage),
-        sigma_mm=1000 * np.interp(chainage, along, _sigma_of_both(rails, left, right, strips[:, :, 2])),
-        points=_whole(_points(rails, left, along, cells) + _points(rails, right, along, cells)),
+        sigma_mm=1000 * np.interp(chainage, along, sigma_m),
+        points=points,
         bridged=np.diff(np.interp(cells, along, bridged), axis=0)[0] > 0.5 * np.diff(cells, axis=0)[0],
         strips=strips[:, at, 0].max(axis=0).astype(int),
         strip_mm=1000 * np.fmax(*strips[:, at, 1]),
-        sigmaz_mm=1000 * np.interp(chainage, along, _height_sigma_of_both(rails, left, right)),
+        sigmaz_mm=1000 * np.interp(chainage, along, sigmaz_m),
     )
 
 

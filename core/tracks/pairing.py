@@ -11,12 +11,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..errors import NoTrackError
 from ..parameters import Parameters
 from ..polyline import Polyline
 from ..progress import SILENT, Progress
 from ..rails import RailLine
+from ..standards import closest_standard
 from .dtw import match_polylines
-from .parallels import MAX_SPACING_M, Parallels, find_parallels
+from .parallels import MAX_SPACING_M, Parallels, find_parallels, most_common_spacing
 
 MIN_SECTION_M = 3.0
 """Shorter sections at gauge occur by chance in a switch."""
@@ -330,3 +332,16 @@ def _free_runs(match: _Match, taken: np.ndarray) -> Iterator[_Match]:
         part = match[run[0] : run[-1] + 1]
         if not taken[run[0]] and part.length_m >= MIN_SECTION_M:
             yield part
+
+
+def refuse_other_spacing(rails: Sequence[RailLine], parameters: Parameters) -> None:
+    """Raise NoTrackError if the spacing of the rails clearly differs from the one given."""
+    gauge_m, head_width_m = parameters.gauge_m, parameters.head_width_m
+    spacing = most_common_spacing(rails, MIN_SECTION_M)
+    if spacing is None or abs(spacing - gauge_m - head_width_m) < parameters.centerline_tolerance_m:
+        return
+    message = f"No track of {1000 * gauge_m:.0f} mm gauge found: rails are {1000 * spacing:.0f} mm apart"
+    likely = closest_standard(spacing, head_width_m)
+    if likely is not None and abs(likely.gauge_m - gauge_m) > 1e-9:
+        raise NoTrackError(f"{message}, is the gauge {1000 * likely.gauge_m:.0f} mm?")
+    raise NoTrackError(f"{message}.")

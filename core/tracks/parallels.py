@@ -136,17 +136,6 @@ def most_common_spacing(rails: Sequence[RailLine], min_length_m: float) -> float
     return float(np.median(spacing[np.abs(spacing - middle) <= 2 * SPACING_BIN_M]))
 
 
-def width_at(spacing_m: float, gauges: Sequence[Gauge]) -> float:
-    """Return the width of the railheads of a track whose rails are at a distance, that of the nearest gauge, metres.
-
-    Examples
-    --------
-    >>> width_at(1.061, [(1.435, 0.072), (1.0, 0.066)])
-    0.066
-    """
-    return min(gauges, key=lambda one: abs(sum(one) - spacing_m))[1]
-
-
 def widths_by_gauge(rails: Sequence[RailLine], gauges: Sequence[Gauge], tolerance_m: float) -> np.ndarray:
     """Return the width of the head of each rail, (n,) metres: that of the gauge at which it runs for the most part.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 from rail_extract.core.errors import ParameterError
-from rail_extract.core.standards import DEFAULT, STANDARDS, UNCONFIRMED, read_gauges, resolve
+from rail_extract.core.standards import DEFAULT, STANDARDS, UNCONFIRMED, closest_standard, read_gauges, resolve
 
 INTERFACE = """
 US_90ARAA_1435 US_100ARAA_1435 US_100RE_1435 US_115RE_1435 US_119RE_1435 US_132RE_1435 US_133RE_1435 US_136RE_1435
@@ -95,3 +95,23 @@ def test_other_gauges_are_read_with_the_width_of_their_heads(text, others):
 def test_other_gauges_that_make_no_sense_are_refused(text, said):
     with pytest.raises(ParameterError, match=said):
         read_gauges(text, "OTHER_GAUGES", STANDARDS[DEFAULT], 0.05)
+
+
+@pytest.mark.parametrize(
+    ("spacing_m", "width_m", "name"),
+    [
+        (1.0619, 0.0622, "IN_75R_1000"),
+        (1.5055, 0.0707, "EN_60E1_1435"),
+        (1.5120, 0.0715, "EN_60E1_1435"),
+        (1.5115, 0.0765, "US_132RE_1435"),
+        (1.7385, 0.0706, "EN_60E1_1668"),
+        (1.7365, 0.0685, "EN_54E1_1668"),
+        (1.5010, 0.0930, "EN_60E1_1435"),  # a blunt cloud
+        (1.7480, 0.1100, "IN_60KG_1676"),
+        (1.0620, 0.0950, "IN_75R_1000"),
+        (1.300, 0.070, None),
+    ],
+)
+def test_closest_standard(spacing_m, width_m, name):
+    standard = closest_standard(spacing_m, width_m)
+    assert (standard and standard.name) == name

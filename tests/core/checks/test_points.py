@@ -1,13 +1,9 @@
-"""Points that are too thin for rails are seen before any raster is made; gauge and head width that points show."""
+"""Points that are too thin for rails are seen before any raster is made."""
 
 import numpy as np
 import pytest
 from heard import Heard
 from rail_extract.core.checks.points import (
-    MIN_IN_WINDOW,
-    WINDOW_M,
-    measure_spacings,
-    occupied_squares,
     plausible,
     warn_of_airborne,
     warn_of_unexplained,
@@ -16,8 +12,7 @@ from rail_extract.core.clouds.points import RailPoints
 from rail_extract.core.errors import CloudError
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.rails import RailLine
-from rail_extract.core.standards import GAUGE_RANGE_MM, HEAD_WIDTH_RANGE_MM, STANDARDS, closest_standard
-from rail_extract.core.tiles.grid import MemorySource, lay_out
+from rail_extract.core.tiles.grid import MIN_IN_WINDOW, WINDOW_M, MemorySource, lay_out, occupied_squares
 
 SIDE_M = 500.0
 RNG = np.random.default_rng(4)
@@ -132,87 +127,3 @@ def test_rails_of_an_airborne_cloud_give_a_warning(per_metre, said):
     warn_of_airborne(source(rail(per_metre=per_metre)), [straight(7.0)], heard)
     assert len(heard.warnings) == bool(said)
     assert all(said in text and "use Track Centerlines from Airborne Lidar" in text for text in heard.warnings)
-
-
-def track(spacing_m, width_m, length_m=30.0, density=300, noise_m=0.003, heading=0.6, seed=1):
-    """Points on the tops of two railheads, uphill by 2 %, with scattered points on their feet."""
-    rng = np.random.default_rng(seed)
-    count = int(density * length_m)
-    along = rng.uniform(0, length_m, 2 * count)
-    side = np.repeat([-0.5, 0.5], count) * spacing_m
-    foot = rng.random(2 * count) < 0.1
-    across = side + rng.uniform(-0.5, 0.5, 2 * count) * np.where(foot, 0.13, width_m)
-    height = 0.02 * along - 0.15 * foot
-    xyz = np.column_stack([along, across, height]) + rng.normal(0, noise_m, (2 * count, 3))
-    turn = np.array([[np.cos(heading), np.sin(heading)], [-np.sin(heading), np.cos(heading)]])
-    return np.column_stack([xyz[:, :2] @ turn, xyz[:, 2]])
-
-
-@pytest.mark.parametrize("name", ["EN_60E1_1435", "IN_75R_1000", "JIS_60_1067", "IN_60KG_1676", "RU_R65_1520"])
-def test_spacing_and_width_of_a_track(name):
-    standard = STANDARDS[name]
-    points = track(standard.gauge_m + standard.head_width_m, standard.head_width_m)
-    spacing_m, width_m = measure_spacings(points).most_common()
-    assert spacing_m == pytest.approx(standard.gauge_m + standard.head_width_m, abs=0.001)
-    assert width_m == pytest.approx(standard.head_width_m, abs=0.004)
-    assert closest_standard(spacing_m, width_m).gauge_m == standard.gauge_m
-
-
-def test_sparse_points_are_enough():
-    spacing_m, _ = measure_spacings(track(1.507, 0.072, length_m=100.0, density=12)).most_common()
-    assert spacing_m == pytest.approx(1.507, abs=0.003)
-
-
-def test_a_part_of_the_points_is_enough_where_they_are_dense():
-    spacing_m, width_m = measure_spacings(track(1.507, 0.072, length_m=3.0, density=10_000)).most_common()
-    assert spacing_m == pytest.approx(1.507, abs=0.001)
-    assert width_m == pytest.approx(0.072, abs=0.004)
-
-
-def test_every_gauge_of_a_mixed_line_is_included():
-    both = [track(1.507, 0.072), track(1.072, 0.072, seed=2) + [40.0, 40.0, 0.0]]
-    spacings = measure_spacings(np.concatenate(both))
-    assert [spacings.include(one, 0.05) for one in (1.507, 1.072, 1.3)] == [True, True, False]
-
-
-def test_one_rail_or_too_few_points_give_none():
-    rail = track(1.507, 0.072)
-    rail = rail[: len(rail) // 2]
-    for points in (
-        rail,
-        rail[:5],
-        rail[:0],
-        np.random.default_rng(1).uniform(0, 30, (2000, 3)),
-        rail[:1].repeat(900, 0),
-    ):
-        spacings = measure_spacings(points)
-        assert spacings.most_common() is None
-        assert not spacings.include(1.507, 0.05)
-
-
-@pytest.mark.parametrize(
-    ("spacing_m", "width_m", "name"),
-    [
-        (1.0619, 0.0622, "IN_75R_1000"),
-        (1.5055, 0.0707, "EN_60E1_1435"),
-        (1.5120, 0.0715, "EN_60E1_1435"),
-        (1.5115, 0.0765, "US_132RE_1435"),
-        (1.7385, 0.0706, "EN_60E1_1668"),
-        (1.7365, 0.0685, "EN_54E1_1668"),
-        (1.5010, 0.0930, "EN_60E1_1435"),  # a blunt cloud
-        (1.7480, 0.1100, "IN_60KG_1676"),
-        (1.0620, 0.0950, "IN_75R_1000"),
-        (1.300, 0.070, None),
-    ],
-)
-def test_closest_standard(spacing_m, width_m, name):
-    standard = closest_standard(spacing_m, width_m)
-    assert (standard and standard.name) == name
-
-
-@pytest.mark.parametrize("end", [0, 1])
-def test_rails_are_a_track_from_the_least_to_the_largest_gauge_with_the_widest_heads(end):
-    spacing_m = (GAUGE_RANGE_MM[end] + HEAD_WIDTH_RANGE_MM[end]) / 1000
-    beyond_m = 0.02 if end else -0.02
-    assert measure_spacings(track(spacing_m - beyond_m, 0.07)).include(spacing_m - beyond_m, 0.003)
-    assert not len(measure_spacings(track(spacing_m + beyond_m, 0.07)).distance_m)

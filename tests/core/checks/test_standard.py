@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from heard import Heard
-from rail_extract.core.checks.points import SEEN_SHARE
-from rail_extract.core.checks.standard import head_widths, warn_of_gauge, warn_of_raw, warn_of_spacing
+from rail_extract.core.checks.spacing import SEEN_SHARE
+from rail_extract.core.checks.standard import head_widths, warn_of_raw
 from rail_extract.core.clouds.points import RailPoints
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.parameters import Parameters
@@ -39,34 +39,6 @@ def heads_of(curve, width_m, gauge_m=1.435, count=40_000):
     left_m = random.choice([-0.5, 0.5], count) * (gauge_m + width_m) + width_m * random.uniform(-0.5, 0.5, count)
     xy = curve.xy[at] + left_m[:, None] * curve.left_normal[at]
     return np.column_stack([xy, 0.003 * random.standard_normal(count)])
-
-
-@pytest.mark.parametrize(
-    ("factor", "stated"),
-    [(1 / 0.3048, "said to be metres, are these feet?"), (0.3048, "said to be feet, are these metres?")],
-)
-def test_coordinates_in_the_wrong_unit_are_recognized(factor, stated):
-    heard = Heard()
-    warn_of_gauge(Sampled(factor * heads_of(CURVE, WIDTH)), Parameters(1.435, WIDTH), heard)
-    (warning,) = heard.warnings
-    assert stated in warning
-    assert ("3.28 times" in warning) == (factor > 1)
-
-
-def test_coordinates_in_the_right_unit_are_no_warning():
-    heard = Heard()
-    warn_of_gauge(Sampled(heads_of(CURVE, WIDTH)), Parameters(1.435, WIDTH), heard)
-    assert heard.warnings == []
-
-
-@pytest.mark.parametrize(("gauge_m", "proposed"), [(1.435, []), (1.52, ["RU_R65_1520"])])
-def test_found_points_of_another_gauge_lead_to_their_standard(gauge_m, proposed):
-    heard, points = Heard(), RailPoints(heads_of(LINE, 0.075, gauge_m), LocalFrame(np.zeros(3)), 10)
-    assert warn_of_spacing(MemorySource(points, 500.0), Parameters(1.435, WIDTH), heard) == bool(proposed)
-    assert heard.proposed == proposed
-    assert [f"Rails are {1000 * gauge_m + 75:.0f} mm apart" in text for text in heard.warnings] == [True] * len(
-        proposed
-    )
 
 
 @pytest.mark.parametrize(("width_m", "count"), [(0.062, 1), (0.068, 0), (0.072, 0), (0.076, 0), (0.084, 1)])

@@ -1,5 +1,7 @@
 """The steps of the walk on squares: what the network sees beyond a border."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from rail_extract.core.clouds.points import RailPoints
@@ -8,11 +10,19 @@ from rail_extract.core.frpdf.cleanup import clean
 from rail_extract.core.parameters import Parameters
 from rail_extract.core.pipeline import extract_rails
 from rail_extract.core.raster import TILE, cell_size, rasterize
-from rail_extract.core.squares.steps import clean_square, engine_for, square_side
+from rail_extract.core.squares.steps import assembled, clean_square, engine_for, merged, mosaic, own_tiles, square_side
 from rail_extract.core.standards import STANDARDS
-from rail_extract.core.tiles.grid import MemorySource, lay_out, own_tiles
+from rail_extract.core.tiles.grid import Filling, MemorySource, Square, lay_out, parted
 
 STANDARD = STANDARDS["EN_60E1_1435"]
+CELL = 0.04
+SIDE = 4 * TILE * CELL
+FRAME = LocalFrame(np.array([387_600.0, 1_430_200.0, 500.0]), 0.3048, 0.3048)
+
+
+def cloud(seed=0, count=4000, length=150.0):
+    along = np.random.RandomState(seed).uniform(0, length, count)
+    return RailPoints(np.column_stack([along, 0.4 * along, np.full(count, 3.0)]), FRAME, 10)
 
 
 @pytest.mark.parametrize("passes", [1, 2])
@@ -54,3 +64,42 @@ def test_thin_rails_are_drawn_for_the_network_and_measured_on_their_points():
         side_m = spacing_m * (rail.xyz[0, 1] > spacing_m / 2)
         assert np.sqrt(np.mean((rail.xyz[:, 1] - side_m) ** 2)) < 0.012
         assert rail.points < 210
+
+
+def test_rasters_of_squares_make_the_raster_of_the_whole():
+    points = cloud()
+    source = MemorySource(points, SIDE)
+    squares = {square.key: square for square in lay_out([source], source)}
+    rasters = {key: own_tiles(rasterize(source.near(square, 1.0).xyz, CELL), square) for key, square in squares.items()}
+    whole = assembled(rasters, squares, FRAME)
+    places = np.sort(whole.to_local(whole.cells()), axis=0)
+    zero = Square.on_grid((0, 0), SIDE, FRAME)
+    direct = rasterize(points.xyz - zero.frame.shift_to(FRAME), CELL)
+    expected = np.sort(direct.to_local(direct.cells()) + zero.frame.shift_to(FRAME)[:2], axis=0)
+    np.testing.assert_allclose(places, expected, rtol=0, atol=1e-6)
+
+
+def test_a_mosaic_contains_the_tiles_of_the_neighbours():
+    points = cloud()
+    source = MemorySource(points, SIDE)
+    squares = {square.key: square for square in lay_out([source], source)}
+    rasters = {key: own_tiles(rasterize(source.near(one, 0.0).xyz, CELL), one) for key, one in squares.items()}
+    key = sorted(squares)[2]
+    seen = mosaic(rasters, squares[key], 4)
+    expected = rasterize(source.near(squares[key], SIDE - 1e-6).xyz, CELL)
+    assert set(seen.tiles) == set(expected.tiles)
+    assert all((seen.tiles[place] == expected.tiles[place]).all() for place in seen.tiles)
+
+
+def test_rasters_of_both_parts_of_a_class_are_one():
+    points = replace(cloud(), strips=np.repeat([1, 2], 2000))
+    zero = Square.on_grid((0, 0), SIDE, FRAME).frame.shift_to(FRAME)
+    rasters = []
+    for source in parted(MemorySource(points, SIDE), [2]):
+        assert isinstance(source, (MemorySource, Filling))
+        squares = {square.key: square for square in lay_out([source], source)}
+        own = {key: own_tiles(rasterize(source.near(one, 0.0).xyz, CELL), one) for key, one in squares.items()}
+        rasters.append(assembled(own, squares, FRAME))
+    whole = rasterize(points.xyz - zero, CELL)
+    places = np.sort(merged(*rasters).to_local(merged(*rasters).cells()), axis=0)
+    np.testing.assert_allclose(places, np.sort(whole.to_local(whole.cells()) + zero[:2], axis=0), atol=1e-6)

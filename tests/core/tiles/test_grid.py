@@ -5,16 +5,10 @@ from dataclasses import replace
 import numpy as np
 from rail_extract.core.clouds.points import RailPoints
 from rail_extract.core.frame import LocalFrame
-from rail_extract.core.raster import TILE, rasterize
+from rail_extract.core.raster import TILE
 from rail_extract.core.tiles.grid import (
-    Filling,
     MemorySource,
-    Square,
-    assembled,
     lay_out,
-    merged,
-    mosaic,
-    own_tiles,
     parted,
 )
 
@@ -57,31 +51,6 @@ def test_a_small_cloud_is_not_divided_and_keeps_its_frame():
     assert len(lay_out([source, MemorySource(cloud(), SIDE)], source)) > 1
 
 
-def test_rasters_of_squares_make_the_raster_of_the_whole():
-    points = cloud()
-    source = MemorySource(points, SIDE)
-    squares = {square.key: square for square in lay_out([source], source)}
-    rasters = {key: own_tiles(rasterize(source.near(square, 1.0).xyz, CELL), square) for key, square in squares.items()}
-    whole = assembled(rasters, squares, FRAME)
-    places = np.sort(whole.to_local(whole.cells()), axis=0)
-    zero = Square.on_grid((0, 0), SIDE, FRAME)
-    direct = rasterize(points.xyz - zero.frame.shift_to(FRAME), CELL)
-    expected = np.sort(direct.to_local(direct.cells()) + zero.frame.shift_to(FRAME)[:2], axis=0)
-    np.testing.assert_allclose(places, expected, rtol=0, atol=1e-6)
-
-
-def test_a_mosaic_contains_the_tiles_of_the_neighbours():
-    points = cloud()
-    source = MemorySource(points, SIDE)
-    squares = {square.key: square for square in lay_out([source], source)}
-    rasters = {key: own_tiles(rasterize(source.near(one, 0.0).xyz, CELL), one) for key, one in squares.items()}
-    key = sorted(squares)[2]
-    seen = mosaic(rasters, squares[key], 4)
-    expected = rasterize(source.near(squares[key], SIDE - 1e-6).xyz, CELL)
-    assert set(seen.tiles) == set(expected.tiles)
-    assert all((seen.tiles[place] == expected.tiles[place]).all() for place in seen.tiles)
-
-
 def test_blunt_strips_show_only_what_the_lines_of_others_leave():
     points = replace(cloud(), strips=np.arange(4000) % 3)
     sharp, blunt = parted(MemorySource(points, SIDE), [1])
@@ -101,17 +70,3 @@ def test_blunt_strips_show_only_what_the_lines_of_others_leave():
     along = np.sort(np.concatenate(left)[:, 0])
     own = points.xyz[points.strips == 1]
     np.testing.assert_allclose(along, np.sort(own[(own[:, 0] < 20.08) | (own[:, 0] > 90.08), 0]), atol=0.05)
-
-
-def test_rasters_of_both_parts_of_a_class_are_one():
-    points = replace(cloud(), strips=np.repeat([1, 2], 2000))
-    zero = Square.on_grid((0, 0), SIDE, FRAME).frame.shift_to(FRAME)
-    rasters = []
-    for source in parted(MemorySource(points, SIDE), [2]):
-        assert isinstance(source, (MemorySource, Filling))
-        squares = {square.key: square for square in lay_out([source], source)}
-        own = {key: own_tiles(rasterize(source.near(one, 0.0).xyz, CELL), one) for key, one in squares.items()}
-        rasters.append(assembled(own, squares, FRAME))
-    whole = rasterize(points.xyz - zero, CELL)
-    places = np.sort(merged(*rasters).to_local(merged(*rasters).cells()), axis=0)
-    np.testing.assert_allclose(places, np.sort(whole.to_local(whole.cells()) + zero[:2], axis=0), atol=1e-6)
