@@ -197,9 +197,7 @@ def things(seed: int, density: float, score: Score) -> None:
     found, _ = run(scene, scene.rng)
     for edge in found.platforms:
         start, _, _, offset, height = min(PLATFORMS, key=lambda one: abs(one[0] - edge.s[0]))
-        score.platforms.append(
-            (1000 * float(edge.offset_m.mean() - offset), 1000 * float(edge.height_m.mean() - height))
-        )
+        score.platforms.append((1000 * float(np.abs(edge.v).mean() - offset), 1000 * float(edge.w.mean() - height)))
     (course, *_), wires = found.courses, [one for one in found.wires if one.course == 0]
     fine = np.concatenate([low + np.linspace(0, 1, 3001)[:, None] * (high - low) for low, high in scene.wire])
     s, v, w = course.located(fine, cKDTree(course.xyz[:, :2]).query(fine[:, :2])[1])

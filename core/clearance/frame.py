@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.signal import savgol_filter
@@ -56,9 +57,6 @@ BESIDE_M = 0.5 * STEP_M
 
 MIN_LENGTH_M = 3.0
 """Shorter lines have no direction that could be measured."""
-
-BY_STATION = ("xyz", "heading", "curvature", "grade", "cant_m", "spacing_m", "bridged", "wide_m")
-"""What a course has for each station."""
 
 
 @dataclass(frozen=True)
@@ -113,9 +111,14 @@ class Course:
         """Chainages of the stations, (n,)."""
         return self.step_m * (self.first + np.arange(len(self.xyz)))
 
+    @property
+    def by_station(self) -> dict[str, Any]:
+        """What it has for each station, by name."""
+        return {name: values for name, values in vars(self).items() if isinstance(values, np.ndarray)}
+
     def part(self, low: int, high: int) -> Course:
         """Return the stations from number `low` to before `high`, with their chainages."""
-        cut = {name: getattr(self, name)[low:high] for name in BY_STATION}
+        cut = {name: values[low:high] for name, values in self.by_station.items()}
         return replace(self, **cut, first=self.first + low)
 
     @property

@@ -129,9 +129,10 @@ def _what(course: Course, parts: Sequence[Part], low: np.ndarray, high: np.ndarr
         return PLATFORM_WORDS
     if kind == WIRE or (low[2] > ARMS_M and any(part.is_live for part in parts)):
         return WIRE_WORDS
-    boxes = sum((part.boxes for part in parts), Counter())
+    in_spaces = sum((part.in_spaces for part in parts), Counter())
+    count = sum(sum(part.codes.values()) for part in parts)
     length_m, _, height_m = (high - low).tolist()
-    track = vehicle_on(boxes, course.track_id, length_m, height_m)
+    track = vehicle_on(in_spaces, count, course.track_id, length_m, height_m)
     return "" if track is None else VEHICLE_WORDS.format(track)
 
 

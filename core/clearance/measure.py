@@ -15,16 +15,18 @@ from ..rails import Kilometres
 from ..run.loop import Runner
 from ..run.tasks import Task
 from ..tiles.grid import Key
+from ..tiles.store import counts_of
+from .along import Trace
 from .frame import Course
 from .intrusions import VEHICLE_WORDS, Intrusion, intrusions_of
 from .neighbours import Side, near, neighbours
-from .platforms import Platform, platforms_of
+from .platforms import platforms_of
 from .profiles import NO_RULE
 from .section import BANDS_M, Section, measure_section, third_least
 from .settings import LEAVE_OUT, Settings
 from .sweep import Swept, part_of, sweep
 from .widening import EBO, widening
-from .wires import Wire, wires_of
+from .wires import wires_of
 
 MEASURE_S = 3e-6
 """Run time of a section per point, in seconds."""
@@ -70,8 +72,8 @@ class Clearance:
     courses: tuple[Course, ...]
     intrusions: tuple[Intrusion, ...]
     stations: tuple[Stations, ...]
-    platforms: tuple[Platform, ...]
-    wires: tuple[Wire, ...]
+    platforms: tuple[Trace, ...]
+    wires: tuple[Trace, ...]
     vehicle: tuple[Key, ...]
     swept: Swept
     warnings: tuple[str, ...] = field(default=())
@@ -93,7 +95,7 @@ class Clearance:
     @property
     def point_count(self) -> int:
         """Points within reach."""
-        return sum(self.swept.seen.values())
+        return int(sum(map(np.sum, self.swept.seen)))
 
     def unseen(self, stations: Stations) -> np.ndarray:
         """Return which stations, (n,), have too few points around them to judge anything."""
@@ -109,12 +111,12 @@ def measure(
     progress: Progress = SILENT,
 ) -> Clearance:
     """Measure the clearance along tracks; the folder is for the points, and the caller removes it."""
-    courses = [_widened(course, settings) for course in courses]
     reading, measuring = progress.divide((1.0, 2.0))
     progress.status("Reading the points along the tracks")
     request.announce(progress)
     swept = sweep(request, courses, settings, folder, runner, reading)
     progress.status("Measuring the clearance")
+    courses = [_widened(course, settings) for course in courses]
     found: dict[Key, Section] = dict(runner.run(_tasks(courses, swept, settings), measuring))
     tracks = [[found[key] for key in sorted(found) if key[0] == at] for at in range(len(courses))]
     objects = intrusions_of(courses, [[part for one in own for part in one.parts] for own in tracks])
@@ -126,9 +128,9 @@ def measure(
         tuple(courses),
         tuple(objects),
         tuple(_stations(courses, at, swept, own, settings) for at, own in enumerate(tracks)),
-        tuple(one for at, own in enumerate(tracks) for one in platforms_of(at, _rows([each.edges for each in own], 6))),
-        tuple(one for at, own in enumerate(tracks) for one in wires_of(at, _rows([each.nodes for each in own], 4))),
-        tuple(key for key, one in sorted(found.items()) if len(one.vehicle)),
+        tuple(one for at, own in enumerate(tracks) for one in platforms_of(at, _rows([each.edges for each in own]))),
+        tuple(one for at, own in enumerate(tracks) for one in wires_of(at, _rows([each.nodes for each in own]))),
+        tuple(key for key, one in sorted(found.items()) if one.has_vehicle),
         swept,
     )
 
@@ -143,7 +145,7 @@ def _widened(course: Course, settings: Settings) -> Course:
 def _tasks(courses: Sequence[Course], swept: Swept, settings: Settings) -> dict[Key, Task]:
     """Return the tasks that measure the sections."""
     tasks = {}
-    for (at, section), count in sorted(swept.sections.items()):
+    for (at, section), count in sorted(counts_of(swept.files).items()):
         own = part_of(courses[at], section)
         others = (near(own, other) for number, other in enumerate(courses) if number != at)
         arguments = ([own, *filter(None, others)], section, swept.files_around(at, section), settings)
@@ -152,9 +154,9 @@ def _tasks(courses: Sequence[Course], swept: Swept, settings: Settings) -> dict[
     return tasks
 
 
-def _rows(parts: Sequence[np.ndarray], columns: int) -> np.ndarray:
-    """Return the rows of all sections, (n, columns)."""
-    return np.concatenate([np.empty((0, columns)), *parts])
+def _rows(parts: Sequence[np.ndarray]) -> np.ndarray:
+    """Return the rows of all sections, (n, 5)."""
+    return np.concatenate([np.empty((0, 5)), *parts])
 
 
 def _stations(
@@ -169,7 +171,7 @@ def _stations(
         for name in ("aside", "margin")
     )
     borders = np.append(s - settings.step_m / 2, s[-1] + settings.step_m / 2)
-    passed = np.interp(borders, course.s + course.step_m / 2, swept.passed(at, course), left=0.0)
+    passed = np.interp(borders, course.s + course.step_m / 2, np.cumsum(swept.seen[at]), left=0.0)
     points = np.rint(np.diff(passed)).astype(np.int64)
     nearest = course.station(s)
     left, right = (

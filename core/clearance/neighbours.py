@@ -6,10 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
 
-from ..polyline import runs
-from .frame import STEP_M, Course
+from ..polyline import Polyline, runs
+from .frame import Course
 from .settings import Settings
 
 REACH_M = 8.0
@@ -87,20 +86,15 @@ def _beside(own: Course, other: Course) -> np.ndarray:
     (3, n) metres at the stations of the first; NaN where the other one is not near. The cant is 0 where the outer track
     has less.
     """
+    feet = Polyline(other.xyz, other.s).feet(own.xyz[:, :2], REACH_M)
+    same = np.cos(own.heading[feet.point] - other.at(feet.t, other.heading))
+    kept = np.abs(same) > np.cos(np.radians(PARALLEL_DEG))
+    mine, theirs, same = feet.point[kept], other.station(feet.t[kept]), same[kept]
+    above = other.at(feet.t[kept], other.xyz[:, 2]) - own.xyz[mine, 2]
+    more = np.abs(other.cant_m[theirs]) - np.abs(own.cant_m[mine])
+    is_outside = np.abs(other.curvature[theirs]) < np.abs(own.curvature[mine])
     found = np.full((3, len(own.xyz)), np.nan)
-    away, nearest = cKDTree(other.xyz[:, :2]).query(own.xyz[:, :2], distance_upper_bound=REACH_M + STEP_M)
-    mine = np.flatnonzero(np.isfinite(away))
-    same = np.cos(own.heading[mine] - other.heading[nearest[mine]])
-    mine, same = (one[np.abs(same) > np.cos(np.radians(PARALLEL_DEG))] for one in (mine, same))
-    if len(mine):
-        s, _, _ = other.located(own.xyz[mine], nearest[mine])
-        theirs = other.station(np.nan_to_num(s))
-        _, across = other.on_arc(own.xyz[mine], theirs)
-        above = np.interp(s, other.s, other.xyz[:, 2]) - own.xyz[mine, 2]
-        more = np.abs(other.cant_m[theirs]) - np.abs(own.cant_m[mine])
-        is_outside = np.abs(other.curvature[theirs]) < np.abs(own.curvature[mine])
-        rows = np.array([-across * np.sign(same), above, np.maximum(np.where(is_outside, more, -more), 0.0)])
-        found[:, mine] = np.where(np.isfinite(s) & (np.abs(across) <= REACH_M), rows, np.nan)
+    found[:, mine] = [-feet.across[kept] * np.sign(same), above, np.maximum(np.where(is_outside, more, -more), 0.0)]
     return found
 
 

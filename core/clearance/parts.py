@@ -12,17 +12,13 @@ from scipy.ndimage import label
 from scipy.spatial import cKDTree
 
 from .frame import Course
-from .settings import Settings
+from .settings import AROUND_M, Settings
 from .surface import ALONG_M, DEEPEST, Surface, surface_of
-from .vehicles import in_boxes
+from .vehicles import spaces_of
 from .wires import LIVE_M, away
 
 OTHER, PLATFORM, WIRE = range(3)
 """What a point is of; parts are of one kind."""
-
-AROUND_M = 0.20
-"""Points up to this distance outside of the profile count for the surface of an object, so that its mean is not cut off
-at zero."""
 
 TOGETHER, TOGETHER_M = 4, 0.10
 """This number of points within a distance makes a thing: dust, birds and rain are single points."""
@@ -82,8 +78,8 @@ class Part:
         Least and largest s, v and w of the points inside.
     raw_m : float
         Penetration of the deepest point.
-    codes, boxes : Counter
-        Points by class; and in the spaces of vehicles, see `vehicles.in_boxes`.
+    codes, in_spaces : Counter
+        Points by class; and in the spaces of vehicles, by track.
     is_live : bool
         Whether a point is so near to the contact wire that the object is live itself.
     surfaces : tuple of Surface
@@ -96,7 +92,7 @@ class Part:
     high: np.ndarray
     raw_m: float
     codes: Counter[int]
-    boxes: Counter[int]
+    in_spaces: Counter[int]
     is_live: bool
     surfaces: tuple[Surface, ...]
     seam: frozenset[tuple[int, ...]]
@@ -121,10 +117,24 @@ def parts_of(
         cells = np.floor(near.place[mine] / CELL_M).astype(np.int64)
         labels = labelled(cells)
         at_seam = np.abs(near.place[mine, :1] - ends).min(axis=1) <= SEAM_M
+        is_live = away(nodes, near.place[mine]) <= LIVE_M
+        spaces = spaces_of(near.place[mine], courses)
         for one in np.unique(labels[near.is_own[mine]]).tolist():
-            seam = frozenset((kind, *cell) for cell in cells[at_seam & (labels == one)].tolist())
-            own = mine[(labels == one) & near.is_own[mine]]
-            found.append(_part(near, own, kind, seam, nodes, courses, settings))
+            which = (labels == one) & near.is_own[mine]
+            own = near.kept(mine[which])
+            found.append(
+                Part(
+                    kind=kind,
+                    low=own.place.min(axis=0),
+                    high=own.place.max(axis=0),
+                    raw_m=float(own.depth.max()),
+                    codes=Counter(dict(enumerate(np.bincount(own.code, own.number).astype(int).tolist()))),
+                    in_spaces=Counter({track: int(own.number[inner[which]].sum()) for track, inner in spaces.items()}),
+                    is_live=bool(is_live[which].any()),
+                    surfaces=tuple(_surfaces(near, mine[which], courses[0], settings)),
+                    seam=frozenset((kind, *cell) for cell in cells[at_seam & (labels == one)].tolist()),
+                )
+            )
     return found
 
 
@@ -136,26 +146,6 @@ def labelled(cells: np.ndarray) -> np.ndarray:
         grid[tuple((cells - low + corner).T)] = True
     found, _ = label(grid, np.ones((3, 3, 3)))
     return found[tuple((cells - low).T)]
-
-
-def _part(
-    near: Points,
-    own: np.ndarray,
-    kind: int,
-    seam: frozenset[tuple[int, ...]],
-    nodes: np.ndarray,
-    courses: Sequence[Course],
-    settings: Settings,
-) -> Part:
-    """Return the part that some points inside make."""
-    place, codes = near.place[own], Counter[int]()
-    for code in np.unique(near.code[own]).tolist():
-        codes[code] = int(near.number[own][near.code[own] == code].sum())
-    is_live = bool(away(nodes, place).min() <= LIVE_M)
-    surfaces = tuple(_surfaces(near, own, courses[0], settings))
-    box = in_boxes(place, courses)
-    raw_m = float(near.depth[own].max())
-    return Part(kind, place.min(axis=0), place.max(axis=0), raw_m, codes, box, is_live, surfaces, seam)
 
 
 def _surfaces(near: Points, own: np.ndarray, course: Course, settings: Settings) -> Iterator[Surface]:

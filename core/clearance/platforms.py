@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator
 
 import numpy as np
 from scipy.ndimage import median_filter
 
-from .along import known_at, pieces
+from .along import Trace, traced_at, traces_of
 
 ASIDE_M, HEIGHT_M = (1.2, 3.0), (0.12, 1.4)
 """Where edges of platforms are, aside and above the rail tops."""
@@ -48,40 +47,20 @@ LEVEL, EDGE = 0.05, 0.10
 """Points at most at these distances above the level and in front of the edge are of the platform."""
 
 
-@dataclass(frozen=True)
-class Platform:
-    """An edge along a track: offset from the middle and height, (n,) each, at the middle of each metre."""
-
-    course: int
-    side: int
-    s: np.ndarray
-    offset_m: np.ndarray
-    height_m: np.ndarray
-    sigma_m: float
-    sigmaz_m: float
-
-    @property
-    def nominal_mm(self) -> int | None:
-        """The nearest nominal height; None if none is near."""
-        mean = 1000 * float(self.height_m.mean())
-        best = min(NOMINAL_MM, key=lambda nominal: abs(nominal - mean))
-        return best if abs(best - mean) <= NOMINAL_WITHIN_MM else None
-
-
-def edges_of(s: np.ndarray, v: np.ndarray, w: np.ndarray) -> np.ndarray:
-    """Return the metres of platform edges in points, (n,) each.
-
-    Rows, (k, 6), are s, side, distance from the middle, height, and the standard errors of both.
-    """
-    strip = (np.abs(v) > ASIDE_M[0]) & (np.abs(v) < ASIDE_M[1]) & (w > HEIGHT_M[0]) & (w < HEIGHT_M[1] + ABOVE_M[1])
-    s, v, w = s[strip], v[strip], w[strip]
+def edges_of(place: np.ndarray) -> np.ndarray:
+    """Return the metres of platform edges that points, (n, 3), show: rows as of `Trace`, (k, 5)."""
+    aside, w = np.abs(place[:, 1]), place[:, 2]
+    strip = (aside > ASIDE_M[0]) & (aside < ASIDE_M[1]) & (w > HEIGHT_M[0]) & (w < HEIGHT_M[1] + ABOVE_M[1])
+    s, v, w = place[strip].T
     metre = 2 * np.floor(s).astype(np.int64) + (v > 0)
     order = np.argsort(metre, kind="stable")
     found = []
     for part in np.split(order, np.flatnonzero(np.diff(metre[order])) + 1) if len(order) else ():
         edge = _edge(np.abs(v[part]), w[part])
-        found += [(np.floor(s[part[0]]) + 0.5, np.sign(v[part[0]]), *edge)] if edge else []
-    return np.reshape(found, (-1, 6))
+        if edge is not None:
+            offset, *rest = edge
+            found.append((np.floor(s[part[0]]) + 0.5, np.sign(v[part[0]]) * offset, *rest))
+    return np.reshape(found, (-1, 5))
 
 
 def _edge(aside: np.ndarray, w: np.ndarray) -> tuple[float, float, float, float] | None:
@@ -141,36 +120,29 @@ def _first_of_level(aside: np.ndarray) -> tuple[float, float]:
     return inner - before / density, float(np.sqrt(before + 1)) / density
 
 
-def platforms_of(course: int, edges: np.ndarray) -> Iterator[Platform]:
-    """Yield the platforms that the metres of a track make, (k, 6)."""
-    for side in (1, -1):
-        rows = edges[edges[:, 1] == side]
+def platforms_of(course: int, edges: np.ndarray) -> Iterator[Trace]:
+    """Yield the platforms that the metres of a track make, (k, 5)."""
+    for sense in (1, -1):
+        rows = edges[sense * edges[:, 1] > 0]
         rows = rows[np.argsort(rows[:, 0])]
-        smooth = median_filter(rows[:, 2:4], (MEDIAN_OF, 1), mode="nearest")
-        rows = rows[(np.abs(rows[:, 2:4] - smooth) <= STRAY_M).all(axis=1)]
-        for part in pieces(rows[:, 0], rows[:, 2:4], (LARGEST_STEP_M, LARGEST_STEP_M), LONGEST_HOLE_M):
-            s, _, offset, height, sigma, sigmaz = rows[part].T
-            if s[-1] - s[0] + 1.0 >= SHORTEST_M:
-                errors = (float(np.sqrt(np.mean(one**2))) for one in (sigma, sigmaz))
-                yield Platform(course, side, s, offset, height, *errors)
+        smooth = median_filter(rows[:, 1:3], (MEDIAN_OF, 1), mode="nearest")
+        rows = rows[(np.abs(rows[:, 1:3] - smooth) <= STRAY_M).all(axis=1)]
+        yield from traces_of(course, rows, (LARGEST_STEP_M,) * 2, LONGEST_HOLE_M, SHORTEST_M, 0.5)
 
 
-def on_platforms(platforms: Iterable[Platform], s: np.ndarray, v: np.ndarray, w: np.ndarray) -> np.ndarray:
-    """Return which points, (n,), are of platforms of their track."""
-    found = np.zeros(len(s), dtype=bool)
-    for one in platforms:
-        offset, height = edge_at([one], one.course, one.side, s)
+def on_platforms(edges: np.ndarray, place: np.ndarray) -> np.ndarray:
+    """Return which points, (n, 3), are of the platforms that the metres of their track make."""
+    found, (s, v, w) = np.zeros(len(place), dtype=bool), place.T
+    platforms = list(platforms_of(0, edges))
+    for side in (1, -1):
+        edge, height = traced_at(platforms, 0, s, side).T
         with np.errstate(invalid="ignore"):
-            found |= (one.side * v >= offset - EDGE) & (w <= height + LEVEL)
+            found |= (side * (v - edge) >= -EDGE) & (w <= height + LEVEL)
     return found
 
 
-def edge_at(platforms: Sequence[Platform], course: int, side: int, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return offset and height of the platform edge on a side of a track at chainages, (n,) each, NaN without one."""
-    found = np.full((len(s), 2), np.nan)
-    for one in platforms:
-        if (one.course, one.side) == (course, side):
-            here = known_at(s, one.s, np.column_stack([one.offset_m, one.height_m]), LONGEST_HOLE_M / 2)
-            found = np.where(np.isfinite(here), here, found)
-    offset, height = found.T
-    return offset, height
+def nominal_mm(platform: Trace) -> int | None:
+    """Return the nominal height of a platform; None if none is near."""
+    mean = 1000 * float(platform.w.mean())
+    best = min(NOMINAL_MM, key=lambda nominal: abs(nominal - mean))
+    return best if abs(best - mean) <= NOMINAL_WITHIN_MM else None

@@ -11,7 +11,7 @@ from ..run.tasks import Context
 from ..tiles.store import read_stored
 from .frame import Course
 from .parts import OTHER, PLATFORM, WIRE, Part, Points, parts_of
-from .platforms import edges_of, on_platforms, platforms_of
+from .platforms import edges_of, on_platforms
 from .settings import Settings
 from .sweep import HALO_M, POINT, SECTION_M
 from .vehicles import own_vehicle
@@ -38,8 +38,8 @@ station, plus the band, plus five on the right."""
 class Section:
     """What a section shows: least distances from the middle and margins, metres, and parts of objects.
 
-    `edges` and `nodes` are rows of `platforms.edges_of` and of `wires.nodes_of`; `vehicle`, (k, 2), are v and w of the
-    cells that the vehicle of the scanner fills.
+    `edges` and `nodes` are rows of `platforms.edges_of` and of `wires.nodes_of`; `has_vehicle` says whether the vehicle
+    of the scanner was left out.
     """
 
     aside: Least
@@ -47,7 +47,7 @@ class Section:
     edges: np.ndarray
     nodes: np.ndarray
     parts: list[Part]
-    vehicle: np.ndarray
+    has_vehicle: bool
 
 
 def measure_section(
@@ -60,20 +60,18 @@ def measure_section(
     course, ends = courses[0], (section * SECTION_M, (section + 1) * SECTION_M)
     points = read_points(course, section, files, settings)
     context.progress.check()
-    is_vehicle, vehicle = own_vehicle(points.place)
+    is_vehicle = own_vehicle(points.place)
     points = points.kept(~is_vehicle)
-    s, v, w = points.place.T
     nodes = nodes_of(points.place, course)
     context.progress.check()
-    edges = edges_of(s, v, w)
+    edges = edges_of(points.place)
     context.progress.check()
-    points.kind[on_platforms(platforms_of(0, edges), s, v, w)] = PLATFORM
+    points.kind[on_platforms(edges, points.place)] = PLATFORM
     points.kind[away(nodes, points.place) <= LIVE_M / 2] = WIRE
     parts = parts_of(points, nodes, courses, ends, settings)
     edges, nodes = (one[(one[:, 0] >= ends[0]) & (one[:, 0] < ends[1])] for one in (edges, nodes))
-    return Section(
-        *least_of(points.kept(points.is_own & (points.kind != WIRE)), settings), edges, nodes, parts, vehicle
-    )
+    least = least_of(points.kept(points.is_own & (points.kind != WIRE)), settings)
+    return Section(*least, edges, nodes, parts, bool(is_vehicle.any()))
 
 
 def read_points(course: Course, section: int, files: Sequence[Sequence[str]], settings: Settings) -> Points:
@@ -82,7 +80,7 @@ def read_points(course: Course, section: int, files: Sequence[Sequence[str]], se
     for off, own in zip((-1, 0, 1), files):
         stored = read_stored(own, POINT)
         s = stored["s"].astype(float) + off * SECTION_M
-        near = (s >= -HALO_M) & (s < SECTION_M + HALO_M)
+        near = (s >= -HALO_M) & (s < SECTION_M + HALO_M) & (np.abs(stored["v"]) <= settings.reach_m)
         is_own = np.full(int(near.sum()), off == 0)
         columns.append((s[near] + section * SECTION_M, *(stored[name][near] for name in ("v", "w", "code")), is_own))
     s, v, w, code, is_own = (np.concatenate(column) for column in zip(*columns))

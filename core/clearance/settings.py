@@ -15,15 +15,32 @@ MARK, LEAVE_OUT = TRAINS = ("MARK", "LEAVE_OUT")
 """Choices of TRAINS: name vehicles on tracks, or omit them."""
 
 BESIDE_M, LEAST_REACH_M = 1.6, 3.0
-"""Points this far beyond the half width of the profile and its margin are kept, so that stations have distances; and
-the least reach, up to which platforms are looked for."""
+"""Points this far beyond the half width of the profile and its margin count, so that stations have distances; and the
+least reach, up to which platforms are looked for."""
 
-LOWEST_M, BELOW_M = 0.12, 0.05
-"""Height at which platform edges begin, even where the lowest height that counts is above; and how far below points
-are kept, as the rough height of a point is off by that."""
+AROUND_M = 0.20
+"""Points up to this distance outside of the profile count for the surface of an object, so that its mean is not cut off
+at zero."""
+
+STORED_M, STORED_UP_M, STORED_LOW_M, STORED_STEP_M = 4.5, 7.5, 0.08, 1.5
+"""Points are stored up to this distance from the track, up to this height, and from this lowest height that counts on:
+all named profiles find theirs there. Larger ones have more stored, in whole steps."""
+
+BELOW_M = 0.05
+"""How far below points are stored, as the rough height of a point is off by that."""
 
 EBO_DISTANCE_M = 4.0
 """Least distance of tracks on the open line (EBO section 10)."""
+
+
+@dataclass(frozen=True)
+class Space:
+    """Which points along a track are stored: those within reach, between two heights, and of no class left out."""
+
+    reach_m: float
+    low_m: float
+    high_m: float
+    left_out: tuple[int, ...]
 
 
 @dataclass(frozen=True)
@@ -52,13 +69,16 @@ class Settings:
 
     @property
     def reach_m(self) -> float:
-        """How far aside of the track points are kept."""
+        """How far aside of the track points count."""
         return max(self.profile.half_width_m + self.margin_m + BESIDE_M, LEAST_REACH_M)
 
     @property
-    def lowest_m(self) -> float:
-        """Height from which points are kept."""
-        return min(self.floor_m, LOWEST_M) - BELOW_M
+    def space(self) -> Space:
+        """Which points are stored: those that count, and those of other profiles of this size."""
+        top_m = self.profile.height_m + self.margin_m + AROUND_M
+        reach_m, high_m = (STORED_STEP_M * float(np.ceil(one / STORED_STEP_M)) for one in (self.reach_m, top_m))
+        low_m = min(self.floor_m, STORED_LOW_M) - BELOW_M
+        return Space(max(reach_m, STORED_M), low_m, max(high_m, STORED_UP_M), self.left_out)
 
     @cached_property
     def outline(self) -> Outline:

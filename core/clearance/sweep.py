@@ -1,28 +1,32 @@
 """The pass over the cloud: points near tracks are sorted into sections of the tracks on disk, in the tracks' frames.
 
 Each file is read once, by a task. A section is a hundred metres of one track, so that memory holds a few sections and
-the stations, however large the cloud is, and results do not depend on how files are cut.
+the stations, however large the cloud is, and results do not depend on how files are cut. What is stored depends on the
+tracks, and on the profile only by how far it reaches, so that a later run with another one finds the points there.
 """
 
 from __future__ import annotations
 
+import hashlib
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from ..clouds.points import Request
+from .. import disk
+from ..clouds.header import CloudHeader
+from ..clouds.points import Request, read_each
 from ..clouds.readers import read_classes
-from ..progress import SILENT, Progress
+from ..progress import SILENT, Progress, counted
 from ..run.loop import Runner
-from ..run.tasks import READ_S, Context, Task
+from ..run.tasks import Context, version
 from ..standards import LAST_CLASS
 from ..tiles.grid import Key
-from ..tiles.store import SortedFile, append, files_of
+from ..tiles.store import SortedFile, append, files_of, fingerprint, kept_points
 from .frame import Cells, Course
-from .settings import BELOW_M, Settings
+from .settings import BELOW_M, Settings, Space
 
 SECTION_M = 100.0
 """Length of a section: with 1,500 points per square metre on all sides, its points take 0.2 GB."""
@@ -30,9 +34,6 @@ SECTION_M = 100.0
 HALO_M = 30.0
 """Length beyond the ends of a section that is read with it: a wire is followed and an object joined over this
 length."""
-
-TOP_M = 7.0
-"""Nothing higher is measured: the highest contact wire is 6.5 m high."""
 
 POINT = np.dtype([("s", "<f4"), ("v", "<f4"), ("w", "<f4"), ("code", "u1")])
 """A point on disk: chainage from the start of its section, v and w in metres, and class."""
@@ -48,33 +49,22 @@ STRIDE = 100
 
 @dataclass(frozen=True)
 class Swept:
-    """The points of a cloud, or of one of its files, along the tracks.
+    """The points of a cloud along the tracks.
 
-    `files` has them by track and section, and `census`, (256,), the points read by class. `heights`, (k,), is how far
-    some of the points that are near a track in plan lie above it, and `seen` the number of these by track and station.
+    `files` has them by track and section, and `census`, (256,), the points read by class. `seen` has, for each track,
+    the number of points near it in plan by station, (n,), and `heights` that of some of these by the whole metres that
+    they lie above the track.
     """
 
     files: tuple[SortedFile, ...]
     census: np.ndarray
-    heights: np.ndarray
-    seen: Counter[Key]
-
-    @property
-    def sections(self) -> Counter[Key]:
-        """Number of points kept by track and section."""
-        return sum((Counter(one.counts) for one in self.files), Counter())
+    seen: tuple[np.ndarray, ...]
+    heights: Counter[int]
 
     def files_around(self, number: int, section: int) -> list[list[str]]:
         """Return the files of the section of a track before the given one, of this one, and of the one after it."""
-        return [files_of((number, section + off), self.files) for off in (-1, 0, 1)]
-
-    def passed(self, number: int, course: Course) -> np.ndarray:
-        """Return the number of points within reach of a track up to its stations, (n,)."""
-        found = np.zeros(len(course.xyz), dtype=np.int64)
-        for (track, station), count in self.seen.items():
-            if track == number:
-                found[station] = count
-        return np.cumsum(found)
+        keys = [(number, section + off) for off in (-1, 0, 1)]
+        return [files_of(key, [one for one in self.files if key in one.counts]) for key in keys]
 
 
 def part_of(course: Course, section: int) -> Course:
@@ -92,30 +82,37 @@ def sweep(
     runner: Runner,
     progress: Progress = SILENT,
 ) -> Swept:
-    """Sort the points along tracks into sections on disk."""
-    far_m = _far_m(courses, settings)
-    areas = [areas_along(course, far_m) / request.zero.horizontal_unit_m for course in courses]
-    tasks = {}
-    for number, header in enumerate(request.headers):
-        touched = [_touching(area, header.extent) for area in areas]
-        if any(map(len, touched)):
-            given = (request, number, courses, settings, touched, folder)
-            tasks[number] = Task(
-                f"Reading {header.path.name}", sweep_file, given, weight=READ_S * (header.point_count + 1)
-            )
-    found = [one for _, one in runner.run(tasks, progress)]
-    return Swept(
-        tuple(file for one in found for file in one.files),
-        np.sum([np.zeros(LAST_CLASS + 1, dtype=np.int64), *(one.census for one in found)], axis=0),
-        np.concatenate([np.empty(0), *(one.heights for one in found)]),
-        sum((one.seen for one in found), Counter()),
-    )
+    """Sort the points along tracks into sections on disk, but for those that an earlier run has left in the folder."""
+    with disk.writing(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+    disk.sweep(folder)
+    space, unit_m = settings.space, request.zero.horizontal_unit_m
+    areas = [areas_along(one, _far_m(one, space)) / unit_m for one in courses]
+    touched = [[_touching(area, header.extent) for area in areas] for header in request.headers]
+    near = [number for number, own in enumerate(touched) if any(map(len, own))]
+    stations = b"".join(values.tobytes() for one in courses for values in one.by_station.values())
+    lines = hashlib.sha256(stations).hexdigest()
+    arguments = [(courses, space, lines, touched[number], folder) for number in near]
+    cloud = replace(request, headers=tuple(request.headers[number] for number in near))
+    found = read_each(cloud, sweep_file, arguments, runner, progress) if near else []
+    kept = sum(is_kept for _, _, is_kept in found)
+    if kept:
+        verb, whose = ("is", "its") if kept == 1 else ("are", "their")
+        said = f"{counted(kept, 'file')} of {len(found)} {verb} not read again"
+        progress.info(f"{said}: an earlier run has kept {whose} points.")
+    seen = tuple(np.zeros(len(one.xyz), dtype=np.int64) for one in courses)
+    heights: Counter[int] = Counter()
+    for _, report, _ in found:
+        heights.update(dict(report["heights"]))
+        for at, station, count in report["seen"]:
+            seen[at][station] += count
+    census = np.sum([np.zeros(LAST_CLASS + 1, dtype=np.int64), *(report["census"] for _, report, _ in found)], axis=0)
+    return Swept(tuple(one for one, _, _ in found), census, seen, heights)
 
 
-def _far_m(courses: Sequence[Course], settings: Settings) -> float:
-    """Return the distance in plan within which all points to keep lie: cant moves the highest ones aside."""
-    leaning = max(float(np.abs(np.sin(one.roll)).max()) for one in courses)
-    return settings.reach_m + TOP_M * leaning
+def _far_m(course: Course, space: Space) -> float:
+    """Return the distance in plan within which all points to store lie: cant moves the highest ones aside."""
+    return space.reach_m + space.high_m * float(np.abs(np.sin(course.roll)).max())
 
 
 def areas_along(course: Course, reach_m: float) -> np.ndarray:
@@ -133,40 +130,67 @@ def _touching(areas: np.ndarray, extent: Sequence[float]) -> np.ndarray:
 
 def sweep_file(
     request: Request,
-    number: int,
+    header: CloudHeader,
     courses: Sequence[Course],
-    settings: Settings,
+    space: Space,
+    lines: str,
     touched: Sequence[np.ndarray],
     folder: Path,
     context: Context,
-) -> Swept:
-    """Sort the points of one file into sections; a task."""
-    path, mine, far_m = request.headers[number].path, SortedFile.new_folder(folder), _far_m(courses, settings)
-    cells = {at: Cells.around(courses[at], far_m) for at, areas in enumerate(touched) if len(areas)}
-    counts: Counter[Key] = Counter()
+) -> tuple[SortedFile, dict, bool]:
+    """Sort the points of one file into sections, unless an earlier run has done so; a task.
+
+    Given are a digest of the tracks, and for each the rectangles that the file touches.
+    """
+
+    def sort(unfinished: Path) -> dict:
+        return _sort(request, header, courses, space, touched, unfinished, context.progress)
+
+    mine = folder / fingerprint(request, header, space, lines, version())
+    report, is_kept = kept_points(mine, header, sort, context.progress)
+    counts = {(at, section): count for at, section, count in report["counts"]}
+    return SortedFile(str(mine), counts), report, is_kept
+
+
+def _sort(
+    request: Request,
+    header: CloudHeader,
+    courses: Sequence[Course],
+    space: Space,
+    touched: Sequence[np.ndarray],
+    folder: Path,
+    progress: Progress,
+) -> dict:
+    """Write the points of a file to the files of their sections; returns the report, see `sweep`."""
+    cells = {at: Cells.around(courses[at], _far_m(courses[at], space)) for at, own in enumerate(touched) if len(own)}
     seen = {at: np.zeros(len(courses[at].xyz), dtype=np.int64) for at in cells}
-    census, heights = np.zeros(LAST_CLASS + 1, dtype=np.int64), [np.empty(0)]
-    wanted = [code for code in EVERY_CLASS if code not in settings.left_out]
-    chunks = read_classes(path, wanted, context.progress, np.concatenate(touched), request.leave_out)
-    for xyz, codes, _, counted in chunks:
-        context.progress.check()
-        census += counted
+    counts, heights = Counter[Key](), Counter[int]()
+    checks: dict[str, int] = {}
+    census = np.zeros(LAST_CLASS + 1, dtype=np.int64)
+    wanted = [code for code in EVERY_CLASS if code not in space.left_out]
+    for xyz, codes, _, counted_now in read_classes(
+        header.path, wanted, progress, np.concatenate(touched), request.leave_out
+    ):
+        census += counted_now
         kept = request.holds(xyz)
         local, codes = request.zero.to_local(xyz[kept]), codes[kept]
         for at, own in cells.items():
-            course = courses[at]
+            progress.check()
             near, station = own.find(local[:, :2])
-            seen[at] += np.bincount(station, minlength=len(course.xyz))
-            heights.append((local[near, 2] - course.xyz[station, 2])[::STRIDE])
-            for section, points in _sorted(course, station, settings, local[near], codes[near]):
-                append(mine, (at, section), points)
+            seen[at] += np.bincount(station, minlength=len(seen[at]))
+            above = local[near[::STRIDE], 2] - courses[at].xyz[station[::STRIDE], 2]
+            heights.update(np.rint(above).astype(int).tolist())
+            for section, points in _sorted(courses[at], station, space, local[near], codes[near]):
+                append(folder, (at, section), points, checks)
                 counts[at, section] += len(points)
-    sparse = {(at, station): int(one[station]) for at, one in seen.items() for station in np.flatnonzero(one).tolist()}
-    return Swept((SortedFile(str(mine), counts),), census, np.concatenate(heights), Counter(sparse))
+    sections = [(*key, count) for key, count in counts.items()]
+    rows = [(at, one, int(own[one])) for at, own in seen.items() for one in np.flatnonzero(own).tolist()]
+    found = {"counts": sections, "seen": rows, "heights": list(heights.items()), "census": census.tolist()}
+    return {"checks": checks, **found}
 
 
 def _sorted(
-    course: Course, station: np.ndarray, settings: Settings, place: np.ndarray, codes: np.ndarray
+    course: Course, station: np.ndarray, space: Space, place: np.ndarray, codes: np.ndarray
 ) -> Iterator[tuple[int, np.ndarray]]:
     """Yield the points to keep of those near a track, (n, 3), given a station near each, by section."""
     east, north = (place[:, :2] - course.xyz[station, :2]).T
@@ -174,9 +198,9 @@ def _sorted(
     aside = north * np.cos(heading) - east * np.sin(heading)
     rough = (place[:, 2] - course.xyz[station, 2] - np.sin(roll) * aside) * np.cos(roll)
     slack = BELOW_M + np.abs(course.grade[station]) * 2.0
-    high = np.flatnonzero((rough > settings.lowest_m - slack) & (rough < TOP_M + slack))
+    high = np.flatnonzero((rough > space.low_m - slack) & (rough < space.high_m + slack))
     s, v, w = course.located(place[high], station[high])
-    kept = np.isfinite(s) & (np.abs(v) <= settings.reach_m) & (w >= settings.lowest_m) & (w <= TOP_M)
+    kept = np.isfinite(s) & (np.abs(v) <= space.reach_m) & (w >= space.low_m) & (w <= space.high_m)
     s, v, w, codes = s[kept], v[kept], w[kept], codes[high[kept]]
     section = np.floor(s / SECTION_M).astype(np.int64)
     for number in np.unique(section).tolist():

@@ -29,21 +29,12 @@ LENGTH_M, TALL_M, SHARE = 6.0, 1.5, 0.6
 INNER_SHARE = 0.05
 """Share of the points of a vehicle on its own track that are near to the middle: its roof and its ends."""
 
-LOOKED_AT = 2000
-"""Points of an object that are looked at: more tell a share no better."""
-
 NEAR_M = 3.0
 """How far from a track a point may be to be in the space of its vehicles."""
 
-ALL = -1
-"""Number that stands for all points that were looked at."""
 
-
-def own_vehicle(place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return which points of a section, (n, 3), are of the vehicle that carried the scanner, and v and w of its cells.
-
-    The cells are (k, 2).
-    """
+def own_vehicle(place: np.ndarray) -> np.ndarray:
+    """Return which points of a section, (n, 3), are of the vehicle that carried the scanner."""
     s, v, w = place.T
     metre = np.floor(s).astype(np.int64)
     may = np.flatnonzero((np.abs(v) < OWN_ASIDE_M) & (w > OWN_HEIGHT_M[0]) & (w < OWN_HEIGHT_M[1]))
@@ -53,31 +44,35 @@ def own_vehicle(place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     is_own = np.bincount(both[:, 0], minlength=len(filled)) > least
     found = np.zeros(len(s), dtype=bool)
     found[may[is_own[cell.ravel()]]] = True
-    return found, (filled[is_own] + 0.5) * OWN_CELL_M
-
-
-def in_boxes(place: np.ndarray, courses: Sequence[Course]) -> Counter[int]:
-    """Count the points, (n, 3) in the frame of the first track, in the spaces of vehicles, by track; see `ALL`."""
-    some = place[:: max(len(place) // LOOKED_AT, 1)]
-    own, *others = courses
-    inner = (np.abs(some[:, 1]) < INNER_M) & (some[:, 2] > BOX_HEIGHT_M[0]) & (some[:, 2] < BOX_HEIGHT_M[1])
-    found = Counter({ALL: len(some), own.track_id: int(inner.sum())})
-    xyz = own.places(*some.T)
-    for other in others:
-        near, station = Cells.around(other, NEAR_M).find(xyz[:, :2])
-        _, v, w = other.located(xyz[near], station)
-        inside = (np.abs(v) < BOX_ASIDE_M) & (w > BOX_HEIGHT_M[0]) & (w < BOX_HEIGHT_M[1])
-        found[other.track_id] += int(inside.sum())
     return found
 
 
-def vehicle_on(boxes: Counter[int], track_id: int, length_m: float, height_m: float) -> int | None:
-    """Return the track on which an object of the profile of a track is a vehicle; None if it is none."""
+def spaces_of(place: np.ndarray, courses: Sequence[Course]) -> dict[int, np.ndarray]:
+    """Return which points, (n, 3) in the frame of the first track, are where vehicles of each track stand, by id."""
+    own, *others = courses
+    found = {own.track_id: _is_within(place[:, 1], place[:, 2], INNER_M)}
+    xyz = own.places(*place.T)
+    for other in others:
+        near, station = Cells.around(other, NEAR_M).find(xyz[:, :2])
+        _, v, w = other.located(xyz[near], station)
+        found[other.track_id] = np.zeros(len(place), dtype=bool)
+        found[other.track_id][near] = _is_within(v, w, BOX_ASIDE_M)
+    return found
+
+
+def _is_within(v: np.ndarray, w: np.ndarray, aside_m: float) -> np.ndarray:
+    return (np.abs(v) < aside_m) & (w > BOX_HEIGHT_M[0]) & (w < BOX_HEIGHT_M[1])
+
+
+def vehicle_on(inside: Counter[int], count: int, track_id: int, length_m: float, height_m: float) -> int | None:
+    """Return the track on which an object in the profile of a track is a vehicle; None if it is none.
+
+    Given are its points in the spaces of vehicles, by track, and all of its points.
+    """
     if length_m <= LENGTH_M or height_m <= TALL_M:
         return None
-    looked = max(boxes[ALL], 1)
-    if boxes[track_id] >= INNER_SHARE * looked:
+    if inside[track_id] >= INNER_SHARE * count:
         return track_id
-    others = {number: count for number, count in boxes.items() if number not in (ALL, track_id)}
+    others = {number: own for number, own in inside.items() if number != track_id}
     best = max(others, key=lambda number: others[number], default=None)
-    return best if best is not None and others[best] >= SHARE * looked else None
+    return best if best is not None and others[best] >= SHARE * count else None

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from ..polyline import interpolate
-from .along import known_at, pieces
+from .along import Trace, known_at, traces_of
 from .frame import Course
 
 ASIDE_M, HEIGHT_M = 1.1, (4.4, 7.0)
@@ -67,45 +66,22 @@ ARMS_M = 4.6
 """Arms are above this height."""
 
 
-@dataclass(frozen=True)
-class Wire:
-    """A contact wire over a track: s, v, w and the standard error of places, (n,) each."""
-
-    course: int
-    s: np.ndarray
-    v: np.ndarray
-    w: np.ndarray
-    sigma_m: np.ndarray
-
-    @property
-    def length_m(self) -> float:
-        """Length along the track."""
-        return float(self.s[-1] - self.s[0])
-
-    @property
-    def grade_pm(self) -> float:
-        """Steepest gradient against the track over 20 m, per mille; NaN for a shorter wire."""
-        known = self.s + GRADE_M <= self.s[-1]
-        rise = np.abs(np.interp(self.s + GRADE_M, self.s, self.w) - self.w)[known]
-        return float(rise.max() / GRADE_M * 1000) if known.any() else np.nan
-
-
 def nodes_of(place: np.ndarray, course: Course) -> np.ndarray:
-    """Return the places of the contact wire over a track in points, (n, 3): s, v, w and standard errors, (k, 4)."""
+    """Return the places of the contact wire over a track in points, (n, 3): rows as of `Trace`, (k, 5)."""
     _, v, w = place.T
     points = place[(np.abs(v) < ASIDE_M) & (w > HEIGHT_M[0]) & (w < HEIGHT_M[1])]
     bins, groups = _groups(*points.T)
     chain = _chain(groups)
     there = np.flatnonzero(chain >= 0)
     if len(there) < LEAST_FITTED:
-        return np.empty((0, 4))
+        return np.empty((0, 5))
     at = (bins[there] + 0.5) * BIN_M
     way = np.array([groups[i][chain[i]][:2] for i in there])
     points = points[(np.abs(points[:, 1:] - interpolate(way, at, points[:, 0])) <= NEAR_M).all(axis=1)]
     points = points[np.argsort(points[:, 0], kind="stable")]
     curvature = course.at(at, course.curvature)
     refined = (_refined(points, *one) for one in zip(at.tolist(), curvature.tolist()))
-    return np.reshape([row for row in refined if row is not None], (-1, 4))
+    return np.reshape([row for row in refined if row is not None], (-1, 5))
 
 
 def _groups(s: np.ndarray, v: np.ndarray, w: np.ndarray) -> tuple[np.ndarray, list[np.ndarray]]:
@@ -164,8 +140,8 @@ def _chain(groups: Sequence[np.ndarray]) -> np.ndarray:
     return chain
 
 
-def _refined(points: np.ndarray, s: float, curvature: float) -> tuple[float, float, float, float] | None:
-    """Return s, v, w and the standard error of the wire at a place; None where too few points tell it.
+def _refined(points: np.ndarray, s: float, curvature: float) -> tuple[float, ...] | None:
+    """Return s, v, w and the standard errors of the wire at a place; None where too few points tell it.
 
     The wire is straight where the track bends: in the frame of the track it is a parabola of the known curvature.
     """
@@ -178,7 +154,7 @@ def _refined(points: np.ndarray, s: float, curvature: float) -> tuple[float, flo
         return None
     least = STEADY * min(scatter for *_, scatter in fits)
     v, w, sigma, _ = next(one for one in fits if one[-1] <= least)
-    return s, v, w, sigma
+    return s, v, w, sigma, sigma
 
 
 def _straight(ahead: np.ndarray, vw: np.ndarray, curvature: float) -> tuple[float, float, float, float] | None:
@@ -198,25 +174,19 @@ def _straight(ahead: np.ndarray, vw: np.ndarray, curvature: float) -> tuple[floa
     return float(fit[0, 0]), float(fit[0, 1]), both * float(np.sqrt(spread)), both
 
 
-def wires_of(course: int, nodes: np.ndarray) -> Iterator[Wire]:
-    """Yield the wires over a track, given places in order: they part where these jump, and at long gaps."""
-    for part in pieces(nodes[:, 0], nodes[:, 1:3], JUMP_M, LONGEST_GAP_M):
-        if nodes[part[-1], 0] - nodes[part[0], 0] >= SHORTEST_M:
-            yield Wire(course, *nodes[part].T)
+def wires_of(course: int, nodes: np.ndarray) -> Iterator[Trace]:
+    """Yield the wires over a track, given places in order."""
+    return traces_of(course, nodes, JUMP_M, LONGEST_GAP_M, SHORTEST_M, 0.0)
 
 
 def away(nodes: np.ndarray, place: np.ndarray) -> np.ndarray:
-    """Return the distance of points, (n, 3), from the places of a wire, (k, 4); inf where there is none."""
+    """Return the distance of points, (n, 3), from the places of a wire, (k, 5); inf where there is none."""
     off = place[:, 1:] - known_at(place[:, 0], nodes[:, 0], nodes[:, 1:3], LONGEST_GAP_M / 2)
     return np.nan_to_num(np.hypot(*off.T), nan=np.inf)
 
 
-def wire_at(wires: Sequence[Wire], course: int, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return height and stagger of the contact wire at chainages, (n,) each, NaN without one."""
-    found = np.full((len(s), 2), np.nan)
-    for one in wires:
-        if one.course == course:
-            here = known_at(s, one.s, np.column_stack([one.w, one.v]), 2 * BIN_M)
-            found = np.where(np.isfinite(here), here, found)
-    height, stagger = found.T
-    return height, stagger
+def grade_pm(wire: Trace) -> float:
+    """Return the steepest gradient of a wire against the track over 20 m, per mille; NaN for a shorter one."""
+    known = wire.s + GRADE_M <= wire.s[-1]
+    rise = np.abs(np.interp(wire.s + GRADE_M, wire.s, wire.w) - wire.w)[known]
+    return float(rise.max() / GRADE_M * 1000) if known.any() else np.nan

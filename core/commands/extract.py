@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import replace
 from functools import partial
 from importlib.util import find_spec
@@ -49,7 +49,6 @@ def _add_workers(group: argparse._ArgumentGroup) -> None:
     group.add_argument("--tls-key", type=Path, metavar="PEM", help="private key of this certificate")
     text = "compute with Dask on this computer, and show what it does at http://127.0.0.1:PORT, to all users"
     group.add_argument("--dashboard", type=int, metavar="PORT", help=text)
-    group.add_argument("--work", type=Path, help="folder that keeps finished results, so that a restart continues")
     group.add_argument(
         "--square-tiles",
         type=int,
@@ -73,7 +72,7 @@ class _Values(FileValues):
     """The values of an extraction whose work may be kept, and be done by a cluster."""
 
     def __init__(self, args: argparse.Namespace, progress: Progress) -> None:
-        super().__init__(JOB, given_to(JOB, args), args.command_line)
+        super().__init__(JOB, given_to(JOB, args), args.command_line, work=args.work)
         self._args, self._folder = args, Path()
         self._certificates = _certificate_files(args, progress)
 
@@ -84,7 +83,7 @@ class _Values(FileValues):
     @contextmanager
     def scratch(self) -> Iterator[Path]:
         """Provide the folder for finished results; without one, one next to the outputs, where a cluster finds it."""
-        with super().scratch() if self._args.work is None else nullcontext(self._args.work) as folder:
+        with super().scratch() as folder:
             self._folder = folder.resolve()
             yield self._folder
 

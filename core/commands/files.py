@@ -42,12 +42,16 @@ LAYERS, PAGES, RASTERS = (".gpkg", ".dxf", ".csv"), (".html", ".htm"), (".tif", 
 class FileValues(Values):
     """Values of the parameters of one run of a job: values and files by name; None, or none, where one is left empty.
 
-    `command` repeats the run, and `keeps` says whether the result stays after it. Raises ParameterError if a value is
+    `command` repeats the run, `keeps` says whether the result stays after it, and `work` is a folder that keeps what is
+    finished for later runs. Raises ParameterError if a value is
     wrong, and DiskError if an output could not be written after the run.
     """
 
-    def __init__(self, job: Job, given: Mapping[str, Any], command: str, keeps: bool = False) -> None:
+    def __init__(
+        self, job: Job, given: Mapping[str, Any], command: str, keeps: bool = False, work: Path | None = None
+    ) -> None:
         self.job, self._command, self._keeps, self._read = job, command, keeps, dict[str, Any]()
+        self._work = work
         self._values = {one.name: read_value(one, given.get(one.name)) for one in job.parameters}
         self._filled = {name for name, one in given.items() if not (one is None or (isinstance(one, str) and not one))}
         named = {one.name: given.get(one.name) for one in job.outputs}
@@ -115,7 +119,10 @@ class FileValues(Values):
 
     @contextmanager
     def scratch(self) -> Iterator[Path]:
-        """Provide a folder for the points of a run: next to the first output, where there is space for it."""
+        """Provide a folder for the points of a run: where it is kept, or next to the first output, if there is one."""
+        if self._work is not None:
+            yield self._work
+            return
         if not self.destinations:
             with TemporaryDirectory() as folder:
                 yield Path(folder)

@@ -10,6 +10,7 @@ import signal
 import sys
 from collections.abc import Callable
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 from ..jobs import CALLS
@@ -36,6 +37,8 @@ def declare(job: Job, parser: argparse.ArgumentParser) -> None:
         group.add_argument(
             option(output), dest=output.name, required=output.required, metavar="FILE", help=_help(output)
         )
+    if job.resumes:
+        parser.add_argument("--work", type=Path, help="folder that keeps what is finished for later runs")
     parser.set_defaults(run=partial(_run, job))
 
 
@@ -76,7 +79,8 @@ def _help(one: Parameter) -> str:
 
 def _run(job: Job, args: argparse.Namespace) -> None:
     """Run with what was given, and print the result in words."""
-    run_and_print(job, partial(FileValues, job, given_to(job, args), args.command_line), console_of(job))
+    work = args.work if job.resumes else None
+    run_and_print(job, partial(FileValues, job, given_to(job, args), args.command_line, work=work), console_of(job))
 
 
 def given_to(job: Job, args: argparse.Namespace) -> dict[str, Any]:

@@ -7,11 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from ..clearance.along import Trace, traced_at
 from ..clearance.measure import Clearance, Stations
 from ..clearance.neighbours import Side
-from ..clearance.platforms import Platform, edge_at
+from ..clearance.platforms import nominal_mm
 from ..clearance.section import BANDS_M
-from ..clearance.wires import wire_at
+from ..clearance.wires import grade_pm
 from ..fields import CLEARANCE, INTRUSIONS, PLATFORMS, SIDES, WIRES
 from ..kilometres.axes import PlacedAxes
 from .layers import Layer
@@ -67,10 +68,10 @@ def _station_columns(found: Clearance, number: int, stations: Stations) -> dict[
             columns[f"{one}{band + 1}_mm"] = 1000 * stations.aside_m[:, at, band]
             columns[f"{one}{band + 1}m_mm"] = 1000 * stations.margin_m[:, at, band]
         columns.update(_neighbour(found, (stations.left, stations.right)[at], one))
-        offset, height = edge_at(found.platforms, number, (1, -1)[at], s)
-        columns[f"{one}off_mm"], columns[f"{one}hgt_mm"] = 1000 * offset, 1000 * height
-    height, stagger = wire_at(found.wires, number, s)
-    return {**columns, "wire_mm": 1000 * height, "stagger_mm": 1000 * stagger}
+        edge, height = 1000 * traced_at(found.platforms, number, s, (1, -1)[at]).T
+        columns[f"{one}off_mm"], columns[f"{one}hgt_mm"] = np.abs(edge), height
+    stagger, height = 1000 * traced_at(found.wires, number, s).T
+    return {**columns, "wire_mm": height, "stagger_mm": stagger}
 
 
 def _neighbour(found: Clearance, side: Side, one: str) -> dict[str, Any]:
@@ -81,51 +82,48 @@ def _neighbour(found: Clearance, side: Side, one: str) -> dict[str, Any]:
 
 def platforms_layer(found: Clearance, axes: PlacedAxes | None) -> Layer:
     """Make the layer of the platform edges."""
-    lines = [_edge(found, one) for one in found.platforms]
+    lines = [_line(found, one) for one in found.platforms]
     table = [
         {
             "platform": number,
-            "track_id": found.courses[one.course].track_id,
+            **_extent(found, one, axes, line),
             "side": "left" if one.side > 0 else "right",
-            "from_m": one.s[0] - 0.5,
-            "to_m": one.s[-1] + 0.5,
-            "length_m": one.s[-1] - one.s[0] + 1.0,
-            **dict(zip(("offset_mm", "offmin_mm", "offmax_mm"), _mean_and_ends(one.offset_m))),
-            **dict(zip(("height_mm", "hmin_mm", "hmax_mm"), _mean_and_ends(one.height_m))),
-            "nominal_mm": one.nominal_mm,
-            "sigma_mm": 1000 * np.hypot(one.sigma_m, found.courses[one.course].sigma_m),
-            "sigmaz_mm": 1000 * np.hypot(one.sigmaz_m, found.courses[one.course].cant_sigma_m),
-            **_extent_km(found, axes, line),
+            **dict(zip(("offset_mm", "offmin_mm", "offmax_mm"), _mean_and_ends(np.abs(one.v)))),
+            **dict(zip(("height_mm", "hmin_mm", "hmax_mm"), _mean_and_ends(one.w))),
+            "nominal_mm": nominal_mm(one),
+            "sigma_mm": 1000 * np.hypot(_rms(one.sigma_m), found.courses[one.course].sigma_m),
+            "sigmaz_mm": 1000 * np.hypot(_rms(one.sigmaz_m), found.courses[one.course].cant_sigma_m),
         }
         for number, (one, line) in enumerate(zip(found.platforms, lines), start=1)
     ]
     return Layer(PLATFORMS, [[row[field.name] for row in table] for field in PLATFORMS.fields], lines)
 
 
-def _edge(found: Clearance, one: Platform) -> np.ndarray:
-    return found.courses[one.course].places(one.s, one.side * one.offset_m, one.height_m)
-
-
 def wires_layer(found: Clearance, axes: PlacedAxes | None) -> Layer:
     """Make the layer of the contact wires."""
-    lines = [found.courses[one.course].places(one.s, one.v, one.w) for one in found.wires]
+    lines = [_line(found, one) for one in found.wires]
     table = [
         {
             "wire": number,
-            "track_id": found.courses[one.course].track_id,
-            "from_m": one.s[0],
-            "to_m": one.s[-1],
-            "length_m": one.length_m,
+            **_extent(found, one, axes, line),
             **dict(zip(("height_mm", "hmin_mm", "hmax_mm"), _mean_and_ends(one.w))),
             "stagmin_mm": 1000 * one.v.min(),
             "stagmax_mm": 1000 * one.v.max(),
-            "grade_pm": one.grade_pm,
-            "sigma_mm": 1000 * float(np.sqrt(np.mean(one.sigma_m**2))),
-            **_extent_km(found, axes, line),
+            "grade_pm": grade_pm(one),
+            "sigma_mm": 1000 * _rms(one.sigma_m),
         }
         for number, (one, line) in enumerate(zip(found.wires, lines), start=1)
     ]
     return Layer(WIRES, [[row[field.name] for row in table] for field in WIRES.fields], lines)
+
+
+def _line(found: Clearance, one: Trace) -> np.ndarray:
+    """Return the vertices of what follows a track."""
+    return found.courses[one.course].places(one.s, one.v, one.w)
+
+
+def _rms(values: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(values**2)))
 
 
 def _mean_and_ends(values_m: np.ndarray) -> tuple[float, float, float]:
@@ -133,9 +131,10 @@ def _mean_and_ends(values_m: np.ndarray) -> tuple[float, float, float]:
     return 1000 * float(values_m.mean()), 1000 * float(values_m.min()), 1000 * float(values_m.max())
 
 
-def _extent_km(found: Clearance, axes: PlacedAxes | None, line: np.ndarray) -> dict[str, Any]:
-    """Return the smallest and the largest kilometre of a line."""
+def _extent(found: Clearance, one: Trace, axes: PlacedAxes | None, line: np.ndarray) -> dict[str, Any]:
+    """Return the track of what follows it, the chainages of its ends, its length, and its kilometres."""
     km = np.empty(0) if axes is None else axes.kilometres(found.frame.to_crs(line)[:, :2]).km
     known = km[np.isfinite(km)]
-    ends = (float(known.min()), float(known.max())) if len(known) else (None, None)
-    return dict(zip(("km_from", "km_to"), ends))
+    km_from, km_to = (float(known.min()), float(known.max())) if len(known) else (None, None)
+    columns = (found.courses[one.course].track_id, *one.ends, one.length_m, km_from, km_to)
+    return dict(zip(("track_id", "from_m", "to_m", "length_m", "km_from", "km_to"), columns))

@@ -257,6 +257,8 @@ class Job:
         Pages of the guide to which the help links.
     call : str
         Name as a function of Python, and with hyphens as a command; empty for what sets up QGIS.
+    resumes : bool
+        Whether a folder can keep what a run has finished for later ones: the command then has the option ``--work``.
     check : callable
         Checks the values before a run, in the main thread; it raises a `RailExtractError`.
     run : callable
@@ -278,6 +280,7 @@ class Job:
     guide: str = "parameters"
     pages: tuple[str, ...] = ("parameters",)
     call: str = ""
+    resumes: bool = False
     check: Callable[[Values], None] = lambda values: None
     run: Callable[[Values, Progress], Result] = _run_elsewhere
 

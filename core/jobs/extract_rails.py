@@ -226,6 +226,7 @@ JOB = Job(
     picture="gauge.svg",
     pages=("parameters", "tutorial", "limits", "troubleshooting"),
     call="extract",
+    resumes=True,
     check=_check,
     run=_run,
 )

@@ -140,9 +140,9 @@ def _check_cloud(found: Clearance, progress: Progress) -> None:
     import numpy as np
 
     swept = found.swept
-    if not swept.seen:
+    if not found.point_count:
         raise RailExtractError("POINTS has no point beside a track: check the coordinate systems.")
-    above_m = float(np.median(swept.heights))
+    above_m = float(np.median([*swept.heights.elements()]))
     if abs(above_m) > HEIGHTS_OFF_M:
         where = "above" if above_m > 0 else "below"
         raise RailExtractError(
@@ -356,6 +356,7 @@ JOB = Job(
     guide="clearance",
     pages=("clearance", "reference"),
     call="clearance",
+    resumes=True,
     check=_check,
     run=_run,
 )

@@ -6,10 +6,11 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
+from ..clearance.along import traced_at
 from ..clearance.intrusions import Intrusion
 from ..clearance.measure import Clearance, Stations
-from ..clearance.platforms import edge_at
-from ..clearance.wires import wire_at
+from ..clearance.platforms import nominal_mm
+from ..clearance.wires import grade_pm
 from ..polyline import runs
 from ..progress import counted, metres, written
 from .clearance_pictures import RULES, cross_section, diagram
@@ -223,10 +224,9 @@ def _platforms(found: Clearance) -> Iterator[str]:
         (
             found.courses[one.course].track_id,
             "left" if one.side > 0 else "right",
-            f"{one.s[0] - 0.5:,.1f} m",
-            f"{one.s[-1] + 0.5:,.1f} m",
-            *(figure(1000 * float(pick(values))) for values in (one.offset_m, one.height_m) for pick in PICKS),
-            one.nominal_mm or "",
+            *(f"{end:,.1f} m" for end in one.ends),
+            *(figure(1000 * float(pick(values))) for values in (np.abs(one.v), one.w) for pick in PICKS),
+            nominal_mm(one) or "",
         )
         for one in found.platforms
     ]
@@ -247,9 +247,9 @@ def _drawn(found: Clearance, number: int) -> str:
     course, panels = found.courses[number], []
     s = np.arange(0.0, course.length_m, 1.0)
     for side, name in ((1, "Platform on the left"), (-1, "Platform on the right")):
-        for what, values in zip(("offset", "height"), edge_at(found.platforms, number, side, s)):
+        for what, values in zip(("offset", "height"), 1000 * np.abs(traced_at(found.platforms, number, s, side)).T):
             if np.isfinite(values).any():
-                panels.append(Panel(f"{name}: {what}", "[mm]", [Curve(s, 1000 * values)], LEAST_SPAN_MM))
+                panels.append(Panel(f"{name}: {what}", "[mm]", [Curve(s, values)], LEAST_SPAN_MM))
     return draw_panels(f"Platforms of track {course.track_id}", panels, (0.0, course.length_m), "chainage [m]")
 
 
@@ -260,11 +260,10 @@ def _wires(found: Clearance) -> Iterator[str]:
     rows = [
         (
             found.courses[one.course].track_id,
-            f"{one.s[0]:,.1f} m",
-            f"{one.s[-1]:,.1f} m",
+            *(f"{end:,.1f} m" for end in one.ends),
             *(figure(1000 * float(pick(one.w))) for pick in PICKS),
             *(figure(1000 * float(pick(one.v))) for pick in PICKS[1:]),
-            figure(one.grade_pm, ".1f", "‰"),
+            figure(grade_pm(one), ".1f", "‰"),
         )
         for one in found.wires
     ]
@@ -272,7 +271,7 @@ def _wires(found: Clearance) -> Iterator[str]:
     for number in _with(found.wires):
         course = found.courses[number]
         s = np.arange(0.0, course.length_m, 0.5)
-        height, stagger = wire_at(found.wires, number, s)
+        stagger, height = traced_at(found.wires, number, s).T
         panels = [
             Panel(name, "[mm]", [Curve(*broken(s, 1000 * values, 1.0))], LEAST_SPAN_MM)
             for name, values in (("Height", height), ("Stagger, positive to the left", stagger))

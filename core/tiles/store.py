@@ -12,7 +12,7 @@ import os
 import uuid
 import zlib
 from collections import Counter
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -32,7 +32,7 @@ REPORT = "report.json"
 POINT_BYTES = 24
 """Bytes of a sorted point: three coordinates."""
 
-LAYOUT = 2
+LAYOUT = 3
 """Number of the layout of sorted points, so that those of an earlier version are read again."""
 
 
@@ -57,12 +57,22 @@ class SortedFile:
         return mine
 
 
-def append(folder: Path, key: tuple[int, ...], points: np.ndarray) -> str:
-    """Append points to the file of a square, or of a square and other whole numbers; returns its name."""
+def append(folder: Path, key: tuple[int, ...], points: np.ndarray, checks: dict[str, int] | None = None) -> str:
+    """Append points to the file of a square, or of a square and other whole numbers; returns its name.
+
+    The checksums of files are kept up to date if they are given, by name.
+    """
     name = "_".join(map(str, key))
     with writing(folder.parent), (folder / name).open("ab") as file:
         file.write(points.data)
+    if checks is not None:
+        checks[name] = zlib.crc32(points.data, checks.get(name, 0))
     return name
+
+
+def key_of(file: str) -> tuple[int, ...]:
+    """Return the numbers that name a file; see `append`."""
+    return tuple(map(int, Path(file).name.split("_")))
 
 
 def counts_of(found: Iterable[SortedFile]) -> Counter[Key]:
@@ -94,9 +104,9 @@ def read_stored(files: Iterable[str], dtype: np.dtype) -> np.ndarray:
 class SpooledFile:
     """The sorted points of one file of the cloud, in a folder, and a report on them.
 
-    "classes" has, for each class code, the number of points by square, the checksum of each square's file, and the
-    smallest and largest x and y in units of the CRS. "census" has the number of all points by class, "steps", for each
-    axis, the number of points of the requested classes by `origin_steps`.
+    "classes" has, for each class code, the number of points by square, and the smallest and largest x and y in units of
+    the CRS. "census" has the number of all points by class, "steps", for each axis, the number of points of the
+    requested classes by `origin_steps`, and "checks" the checksum of each file.
     """
 
     folder: str
@@ -128,7 +138,7 @@ class SpooledPoints:
         files = [file for key in keys for file in self.files.get(key, ())]
         parts = [_read(file, square, margin_m) for file in files]
         xyz = parts[0] if len(parts) == 1 else np.concatenate(parts or [np.empty((0, 3))])
-        strips = np.array([self.passes[_numbers(file)[-1]] for file in files], dtype=np.int32)
+        strips = np.array([self.passes[key_of(file)[-1]] for file in files], dtype=np.int32)
         each = np.repeat(strips, [len(part) for part in parts]) if len(np.unique(strips)) > 1 else None
         return heads_of(RailPoints(xyz, square.frame, self.class_code, each, self.found, self.blunt))
 
@@ -139,7 +149,7 @@ class SpooledPoints:
     def of_strips(self, strips: Collection[int], among: bool = True) -> SpooledPoints:
         """See `PointSource`."""
         files = {
-            key: tuple(file for file in own if (self.passes[_numbers(file)[-1]] in strips) == among)
+            key: tuple(file for file in own if (self.passes[key_of(file)[-1]] in strips) == among)
             for key, own in self.files.items()
         }
         files = {key: own for key, own in files.items() if own}
@@ -152,7 +162,7 @@ class SpooledPoints:
             return self
         keys = [key for key in around(square.key) if key in self.files]
         files = {key: self.files[key] for key in keys}
-        marks = {_numbers(file)[-1] for own in files.values() for file in own}
+        marks = {key_of(file)[-1] for own in files.values() for file in own}
         passes = {mark: self.passes[mark] for mark in sorted(marks)}
         return replace(self, counts={key: self.counts[key] for key in keys}, files=files, passes=passes)
 
@@ -186,34 +196,47 @@ def spool_file(
     Two processes may sort the same file at the same time: each writes to its own folder, and the first to finish
     provides the result.
     """
-    mine = folder / _fingerprint(request, header, side_m)
+
+    def sort(unfinished: Path) -> dict:
+        return _sort(request, header, side_m, unfinished, progress)
+
+    mine = folder / fingerprint(request, header, side_m)
+    report, _ = kept_points(mine, header, sort, progress)
+    return SpooledFile(str(mine), report)
+
+
+def kept_points(
+    mine: Path, header: CloudHeader, sort: Callable[[Path], dict], progress: Progress = SILENT
+) -> tuple[dict, bool]:
+    """Return the report on the sorted points of a file, and whether an earlier run has left them in the folder `mine`.
+
+    If it has not, or they are damaged, `sort` writes them to a folder and returns their report, whose "checks" are the
+    checksums of the files. The name of the folder is to change with everything that they depend on; see `fingerprint`.
+    """
     if os.path.lexists(mine):
         try:
-            return SpooledFile(str(mine), _checked_report(mine))
+            return _checked_report(mine), True
         except ValueError:
             progress.warning(f"The stored points of {header.path.name} are damaged: the file is read again.")
             discard(mine)
-    with writing(folder), scratch_folder(folder) as scratch:
+    with writing(mine.parent), scratch_folder(mine.parent) as scratch:
         unfinished = scratch / mine.name
         unfinished.mkdir()
-        found = _sort(request, header, side_m, unfinished, progress)
+        report = sort(unfinished)
+        text = json.dumps(report)
+        (unfinished / REPORT).write_text(f"{_digest(text)}\n{text}", encoding="ascii")
         _name_first(unfinished, mine)
-    return SpooledFile(str(mine), found)
+    return report, False
 
 
 def _sort(request: Request, header: CloudHeader, side_m: float, folder: Path, progress: Progress) -> dict:
-    """Write the points of a file to the files of their squares, and the report; returns the report."""
+    """Write the points of a file to the files of their squares; returns the report."""
     found = Census()
     for xyz, codes, marks, census in request.read(header, progress):
         found.census += census
-        with writing(folder.parent):
-            for code in np.unique(codes).tolist():
-                found.add(code, xyz[codes == code], marks[codes == code], request.zero, side_m, folder)
-    report = found.report()
-    text = json.dumps(report)
-    with writing(folder.parent):
-        (folder / REPORT).write_text(f"{_digest(text)}\n{text}", encoding="ascii")
-    return report
+        for code in np.unique(codes).tolist():
+            found.add(code, xyz[codes == code], marks[codes == code], request.zero, side_m, folder)
+    return found.report()
 
 
 def _checked_report(folder: Path) -> dict:
@@ -223,10 +246,9 @@ def _checked_report(folder: Path) -> dict:
         if digest != _digest(text):
             raise ValueError(REPORT)
         report = json.loads(text)
-        for found in report["classes"].values():
-            for name, check in found["checks"].items():
-                if zlib.crc32((folder / name).read_bytes()) != check:
-                    raise ValueError(name)
+        for name, check in report["checks"].items():
+            if zlib.crc32((folder / name).read_bytes()) != check:
+                raise ValueError(name)
     except OSError as error:
         raise ValueError(str(error)) from error
     return report
@@ -259,7 +281,7 @@ def gather(request: Request, side_m: float, found: Sequence[SpooledFile]) -> tup
         (mark, *key)
         for file in found
         for of_class in file.report["classes"].values()
-        for _, *key, mark in map(_numbers, of_class["squares"])
+        for _, *key, mark in map(key_of, of_class["squares"])
     ]
     marks, *places = np.array(rows).T
     passes = number_passes(marks, np.column_stack(places))
@@ -272,20 +294,19 @@ class Census:
     def __init__(self) -> None:
         self.census = np.zeros(256, dtype=np.int64)
         self._classes: dict[int, dict] = {}
+        self._checks: dict[str, int] = {}
         self._steps: list[Counter[float]] = [Counter(), Counter(), Counter()]
 
     def add(self, code: int, xyz: np.ndarray, marks: np.ndarray, zero: LocalFrame, side_m: float, folder: Path) -> None:
         """Append points of one class, (n, 3) in units of the CRS, to the files of their squares and marks, (n,)."""
         if not len(xyz):
             return
-        new = {"squares": {}, "checks": {}, "low": [np.inf] * 2, "high": [-np.inf] * 2}
+        new = {"squares": {}, "low": [np.inf] * 2, "high": [-np.inf] * 2}
         mine = self._classes.setdefault(code, new)
         for mark in np.unique(marks).tolist():
             own = xyz[marks == mark]
             for key, numbers in Tiling(side_m).sort(zero.to_local(own)).items():
-                points = own[numbers]
-                name = append(folder, (code, *key, mark), points)
-                mine["checks"][name] = zlib.crc32(points.data, mine["checks"].get(name, 0))
+                name = append(folder, (code, *key, mark), own[numbers], self._checks)
                 mine["squares"][name] = mine["squares"].get(name, 0) + len(numbers)
         mine["low"] = np.minimum(mine["low"], xyz[:, :2].min(axis=0)).tolist()
         mine["high"] = np.maximum(mine["high"], xyz[:, :2].max(axis=0)).tolist()
@@ -298,14 +319,10 @@ class Census:
         classes = {str(code): found for code, found in self._classes.items()}
         return {
             "classes": classes,
+            "checks": self._checks,
             "census": self.census.tolist(),
             "steps": [list(map(list, steps.items())) for steps in self._steps],
         }
-
-
-def _numbers(file: str) -> list[int]:
-    """Return the numbers that name a file of points: class, both numbers of the square, and mark."""
-    return [int(part) for part in Path(file).name.split("_")]
 
 
 def _source(
@@ -317,7 +334,7 @@ def _source(
     mine = [(file.folder, file.report["classes"][str(code)]) for file in found if str(code) in file.report["classes"]]
     for folder, of_class in mine:
         for name, count in of_class["squares"].items():
-            _, column, row, _ = _numbers(name)
+            _, column, row, _ = key_of(name)
             key = (column, row)
             counts[key] = counts.get(key, 0) + count
             files[key] = (*files.get(key, ()), str(Path(folder) / name))
@@ -327,8 +344,8 @@ def _source(
     return SpooledPoints(frame, code, side_m, counts, span_m, files, passes)
 
 
-def _fingerprint(request: Request, header: CloudHeader, side_m: float) -> str:
-    """Return a name that depends on the file and on everything that determines how its points are sorted."""
+def fingerprint(request: Request, header: CloudHeader, *how: object) -> str:
+    """Return a name that depends on the file, on which of its points are requested, and on how they are sorted."""
     state = header.path.stat()
     facts = (
         LAYOUT,
@@ -340,8 +357,8 @@ def _fingerprint(request: Request, header: CloudHeader, side_m: float) -> str:
         request.extent,
         None if request.mask is None else hashlib.sha256(request.mask.edges.tobytes()).hexdigest(),
         sorted(request.leave_out),
-        side_m,
         request.zero.horizontal_unit_m,
         request.zero.vertical_unit_m,
+        *how,
     )
     return hashlib.sha256(repr(facts).encode()).hexdigest()[:24]

@@ -1,5 +1,8 @@
 """Measure Clearance as a command: own profiles, kilometres, other coordinate systems, and wrong inputs."""
 
+import os
+import shutil
+
 import numpy as np
 import pytest
 from rail_extract.__main__ import main
@@ -56,9 +59,9 @@ def place(tmp_path_factory):
     return folder
 
 
-def clearance(place, out, *more, lines="own"):
+def clearance(place, out, *more, lines="own", cloud=None):
     """Run the command; returns its exit status and the rows of the intrusions."""
-    given = [f"{place / lines}.gpkg|layername=centerlines", str(place / "cloud.laz")]
+    given = [f"{place / lines}.gpkg|layername=centerlines", str(cloud or place / "cloud.laz")]
     given += ["--rails", f"{place / lines}.gpkg|layername=rails", "--intrusions", str(out)]
     status = main(["clearance", *given, *map(str, more)])
     if status:
@@ -106,3 +109,43 @@ def test_a_wrong_input_gets_one_sentence(place, tmp_path, capsys, more, words):
     assert words in said
     assert "Traceback" not in said
     assert not (tmp_path / "out.gpkg").exists()
+
+
+def columns_of(path):
+    """Return the layers of a file as lists of values, by layer and field."""
+    found = {}
+    for name, _ in pyogrio.list_layers(str(path)).tolist():
+        meta, _, places, columns = pyogrio.raw.read(str(path), layer=name)
+        found[name] = dict(zip(meta["fields"].tolist(), [one.tolist() for one in columns]), places=places.tolist())
+    return found
+
+
+def test_another_profile_takes_the_points_that_a_run_has_kept(place, tmp_path, capsys):
+    cloud, layers = tmp_path / "cloud.laz", ("--output", "--platforms", "--wires")
+    shutil.copy(place / "cloud.laz", cloud)
+    times = cloud.stat()
+
+    def rows(out, *more, profile="EBO_MAIN"):
+        named = [word for layer in layers for word in (layer, out)]
+        status, _ = clearance(place, out, *named, "--profile", profile, *more, cloud=cloud)
+        assert status == 0
+        return columns_of(out)
+
+    fresh = rows(tmp_path / "fresh.gpkg", "--margin", "100")
+    rows(tmp_path / "first.gpkg", "--work", tmp_path / "work", profile="EBO_G1")
+    assert "not read again" not in capsys.readouterr().err
+    with cloud.open("r+b") as file:  # the header stays, the points can't be read any more
+        file.seek(times.st_size // 2)
+        file.write(bytes(times.st_size // 4))
+    os.utime(cloud, ns=(times.st_atime_ns, times.st_mtime_ns))
+    assert clearance(place, tmp_path / "none.gpkg", cloud=cloud)[0] == 1
+    kept = rows(tmp_path / "kept.gpkg", "--margin", "100", "--work", tmp_path / "work")
+    assert "1 file of 1 is not read again: an earlier run has kept its points." in capsys.readouterr().err
+    assert str(kept) == str(fresh) and len(fresh["clearance"]["places"]) == 61
+
+
+def test_kept_points_that_do_not_reach_far_enough_are_read_again(place, tmp_path, capsys):
+    work = ("--work", tmp_path / "work")
+    clearance(place, tmp_path / "out.gpkg", *work)
+    assert clearance(place, tmp_path / "out.gpkg", *work, "--margin", "1900", "--profile", "EBO_MAIN")[0] == 0
+    assert "not read again" not in capsys.readouterr().err

@@ -20,10 +20,10 @@ from rail_extract.core.tiles.store import (
     Census,
     SortedFile,
     SpooledPoints,
-    _fingerprint,
     append,
     counts_of,
     files_of,
+    fingerprint,
     read_stored,
     spool,
 )
@@ -259,7 +259,7 @@ def test_the_order_of_classes_counts_where_the_first_one_holds_all_points(files)
     request = ask(files, [10, 11])
     names = set()
     for merged, codes in ((False, (10, 11)), (False, (11, 10)), (True, (10, 11)), (True, (11, 10))):
-        names.add(_fingerprint(replace(request, merged=merged, class_codes=codes), request.headers[0], SIDE))
+        names.add(fingerprint(replace(request, merged=merged, class_codes=codes), request.headers[0], SIDE))
     assert len(names) == 3
 
 
