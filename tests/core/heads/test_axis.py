@@ -1,7 +1,6 @@
 import numpy as np
 import pytest
-from rail_extract.core.clouds.points import RailPoints
-from rail_extract.core.frame import LocalFrame
+from built import cloud_of
 from rail_extract.core.heads.axis import UNSHOWN_M, Axis
 from rail_extract.core.heads.elevation import elevate
 from rail_extract.core.heads.head_points import HeadPoints, near_lines, stations_along
@@ -51,7 +50,7 @@ def test_errors_of_lines_are_as_large_as_stated(left_m, noise_m):
     scanner = Scanner(noise_m=noise_m)
     gaps = ((30.0, 31.5), (60.0, 62.0), (90.0, 93.0))
     rails = [scan(track.railhead(side), WIDTH, path, scanner, random, gaps[: 3 * (side > 0)]) for side in (1, -1)]
-    points = RailPoints(np.concatenate(rails), LocalFrame(np.zeros(3)), 10)
+    points = cloud_of(*rails)
     network = smooth_network(vectorize(rasterize(points.xyz, cell_size(GAUGE, WIDTH)), WIDTH), 0.8)
     network = refine(network, points, WIDTH)
     lines = elevate(network, near_lines(network.lines, points.xyz, WIDTH), 10)

@@ -9,7 +9,7 @@ from rail_extract.core.heads.outline import (
     Scores,
     fit_section,
 )
-from rail_extract.laboratory.scenes.scanner import Profile, Scanner, head_outline, scan
+from rail_extract.laboratory.scenes.scanner import Scanner, head_outline, scan
 from rail_extract.laboratory.scenes.tracks import Railhead
 
 WIDTH = 0.072
@@ -51,16 +51,6 @@ def test_the_outline_is_that_of_the_laboratory():
     np.testing.assert_allclose(np.sort(outline.left), -np.sort(-outline.left)[::-1])
 
 
-@pytest.mark.parametrize("angle_deg", [10, 17, 30, 45, 75])
-@pytest.mark.parametrize("share", [0.0, 0.3, 1.0])
-def test_a_head_is_found_whatever_share_of_its_face_is_seen(angle_deg, share):
-    for noise_m, off_m in ((0.003, 0.006), (0.005, -0.006)):
-        left, up = seen_from(angle_deg, share, noise_m)
-        _, section, _, _ = fitted(left + off_m, up)
-        assert section.place[0] == pytest.approx(off_m, abs=0.0015)
-        np.testing.assert_allclose(np.exp(section.place[4:6]), noise_m, rtol=0.25)
-
-
 def test_strays_do_not_pull():
     random = np.random.default_rng(0)
     left, up = seen_from(45, 0.5, 0.004)
@@ -92,15 +82,6 @@ def test_scores_tell_a_shift_from_a_lift(moved_m):
     own = scores.by_bin[:, number[number >= 0]]
     np.testing.assert_allclose(own.mean(axis=1) / (own**2).mean(axis=1), moved_m, atol=2.5e-4)
     assert (own[1] ** 2).mean() == pytest.approx(scores.per_point, rel=0.15)
-
-
-@pytest.mark.parametrize("radius_m", [0.3, 0.8])
-def test_a_worn_crown_does_not_lower_the_top(radius_m):
-    head = (straight_head(), WIDTH, np.column_stack([np.linspace(0, 40, 400), np.zeros((400, 2))]))
-    left, up = scan(*head, Scanner(noise_m=0.003), np.random.RandomState(0), shape=Profile(radius_m))[:, 1:].T
-    _, section, _, _ = fitted(left, up)
-    assert section.place[1] == pytest.approx(0.0, abs=2e-4)
-    assert section.place[6] == pytest.approx(0.5 / radius_m - 0.5 / 0.3, abs=0.4)
 
 
 @pytest.mark.parametrize(("left", "up"), [(0.0, 0.0), (0.05, 0.01), (0.036, -0.03)])

@@ -2,12 +2,10 @@
 
 import numpy as np
 import pytest
-from rail_extract.core.clouds.points import RailPoints
-from rail_extract.core.frame import LocalFrame
+from built import cloud_of, network_of
 from rail_extract.core.heads.elevation import elevate
 from rail_extract.core.heads.head_points import near_lines
 from rail_extract.core.heads.roads import onto_heads
-from rail_extract.core.lines.network import LineNetwork
 
 WIDTH, SPACING, LENGTH = 0.056, 1.491, 40.0
 
@@ -22,7 +20,7 @@ def street(road_m, sides=(1, -1), seed=0):
         y = side * (0.5 * SPACING + across)
         clouds.append(np.column_stack([random.uniform(0, LENGTH, count), y, np.zeros(count)]))
     xyz = np.concatenate(clouds)
-    return RailPoints(xyz + random.normal(0, 0.003, xyz.shape), LocalFrame(np.zeros(3)), 10)
+    return cloud_of(xyz + random.normal(0, 0.003, xyz.shape))
 
 
 def drawn(*y):
@@ -54,6 +52,5 @@ def test_a_band_without_a_partner_stays_and_its_error_is_half_of_the_road():
     points = points.kept(points.xyz[:, 1] > 0)
     lines = onto_heads(drawn(0.5 * (SPACING + 0.07)), points, np.array([WIDTH]), [SPACING])
     assert np.allclose(lines[0][:, 1], 0.5 * (SPACING + 0.07))
-    network = LineNetwork(tuple(lines), lines[0][[0, -1]], np.array([[0, 1]]))
-    (rail,) = elevate(network, near_lines(lines, points.xyz, WIDTH), 10)
+    (rail,) = elevate(network_of(*lines), near_lines(lines, points.xyz, WIDTH), 10)
     assert np.median(rail.support.sigma_m) == pytest.approx(0.035, abs=0.004)

@@ -35,8 +35,7 @@ def mean_m(middles, factor=1.0):
 
 
 @pytest.mark.parametrize("angle_deg", [17, 30, 45])
-@pytest.mark.parametrize("share", [0.3, 1.0])
-@pytest.mark.parametrize("slope", [0.0, 0.08])
+@pytest.mark.parametrize(("share", "slope"), [(0.3, 0.08), (1.0, 0.0), (1.0, 0.08)])
 def test_the_middle_does_not_lean_to_the_scanner(angle_deg, share, slope):
     middles = middles_of(scanned(angle_deg, share, slope=slope))
     assert np.isfinite(middles.offset[:-1]).all()

@@ -5,16 +5,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rail_extract.core.heads.smoother import (
-    BAND,
     BLUNT,
     SHARP,
-    _covariance,
-    _of_both,
-    _Priors,
     bridge_error,
     smooth,
 )
-from scipy.linalg import cholesky_banded
 
 NOISE_M = 0.0008
 
@@ -100,43 +95,6 @@ def test_a_few_values_give_a_course(count):
     found = smooth(t, np.full(count, 5.0), np.full(count, 1e6), 1.0, 3.4)
     assert found.at(np.array([0.0, 2.0, 9.0])) == pytest.approx(5.0, abs=0.001)
     assert np.isfinite(found.sigma(np.array([1.0, 2.0, 3.4]))).all()
-
-
-def whole(band):
-    """The symmetric matrix of a band."""
-    upper = sum(np.diag(row[: len(row) - apart], apart) for apart, row in enumerate(band))
-    return upper + np.triu(upper, 1).T
-
-
-def test_the_stated_errors_are_those_of_the_whole_matrix():
-    """The information about the sum of both splines is shared, that of their priors is not."""
-    random, count = np.random.default_rng(5), 12
-    lower = np.tril(np.triu(random.normal(0, 1, (count, count)), -1)) + 2 * np.eye(count)
-    data = np.array([np.append(np.diag(lower @ lower.T, -apart), np.zeros(apart)) for apart in range(BAND)])
-    priors = _Priors(np.array([0.01, 0.02]), np.array([0.5, 0.25]), 0.5, np.zeros(count - 3), SHARP)
-    weights = np.ones((2, count - 3)), random.uniform(0.5, 2.0, (2, count - 2))
-    bands = _of_both(data)[:, None] + priors.information(weights, count)
-    design, waves = (np.diff(np.eye(count), order, axis=0) for order in (3, 2))
-    for one in range(2):
-        (of_design,), (of_waves,) = (scale[one] for scale in priors.scales)
-        both = np.kron(whole(data), np.ones((2, 2)))
-        both[::2, ::2] += design.T @ design / of_design**2
-        both[1::2, 1::2] += waves.T @ np.diag(weights[1][one]) @ waves / of_waves**2 + priors.hold[one] * np.eye(count)
-        np.testing.assert_allclose(whole(bands[:, one]), both, atol=1e-9)
-        for prior, part in ((SHARP, np.ones(2)), (BLUNT, np.array([1.0, 0.0]))):
-            course = np.kron(np.eye(count), part)
-            covariance = course @ np.linalg.inv(both) @ course.T
-            for apart, row in enumerate(_covariance(cholesky_banded(bands[:, one], lower=True), prior)):
-                np.testing.assert_allclose(row[: count - apart], np.diag(covariance, -apart), rtol=1e-6)
-
-
-def test_waves_of_the_prior_have_their_amplitude():
-    """The covariance of the prior alone, far from the ends; the coefficients of a spline exceed its values a little."""
-    count = 200
-    priors = _Priors(np.array([1e-3]), np.array([0.002]), 0.5, np.zeros(count - 3), SHARP)
-    band = priors.information((np.ones((1, count - 3)), np.ones((1, count - 2))), count)[::2, 0, 1::2]
-    deviation = np.sqrt(np.diag(np.linalg.inv(whole(band)))[40:-40])
-    np.testing.assert_allclose(deviation, 0.002, rtol=0.05)
 
 
 def test_a_line_that_bends_is_straightened_but_not_one_in_a_curve():

@@ -4,8 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rail_extract.core.clouds.points import RailPoints
-from rail_extract.core.frame import LocalFrame
+from built import cloud_of, network_of
 from rail_extract.core.heads.elevation import ElevationParameters, elevate
 from rail_extract.core.heads.head_points import near_lines
 from rail_extract.core.heads.refinement import refine
@@ -14,7 +13,6 @@ from rail_extract.core.heads.strips import (
     rows_of,
     strip_courses,
 )
-from rail_extract.core.lines.network import LineNetwork
 from rail_extract.core.rails import Centerline
 from rail_extract.laboratory.scenes.scanner import Scanner, scan
 from rail_extract.laboratory.scenes.tracks import Railhead
@@ -36,7 +34,7 @@ def rail(shifts, seed=0, per_m=150, noise_m=0.003, radius_m=600.0):
     xyz = np.concatenate(parts) + noise_m * rng.standard_normal((sum(map(len, parts)), 3))
     x = np.arange(0.0, LENGTH_M + 0.1, 0.2)
     line = np.column_stack([x, x**2 / 2 / radius_m])
-    return RailPoints(xyz, LocalFrame(np.zeros(3)), 10, np.concatenate(strips)), line
+    return cloud_of(xyz, strips=np.concatenate(strips)), line
 
 
 def scanned(passes):
@@ -51,16 +49,11 @@ def scanned(passes):
         kept = rng.choice(len(points), min(count, len(points)), replace=False)
         parts.append(points[np.sort(kept)] + [0.0, across, up])
     strips = np.repeat(np.arange(1, len(parts) + 1), [len(part) for part in parts]).astype(np.uint16)
-    return RailPoints(np.concatenate(parts), LocalFrame(np.zeros(3)), 10, strips), line[::20, :2]
+    return cloud_of(*parts, strips=strips), line[::20, :2]
 
 
 def strips_along(lines, points):
     return [measure_strips(one) for one in near_lines(lines, points.xyz, HEAD_M, points.strips)]
-
-
-def single(line):
-    """Return a network of one line."""
-    return LineNetwork((line,), line[[0, -1]], np.array([[0, 1]]), np.empty((0, 3), dtype=int))
 
 
 @pytest.mark.parametrize("third", [False, True])
@@ -82,7 +75,7 @@ def test_strips_over_the_same_place_are_offset_from_their_mean(third):
 
 def test_a_line_is_on_the_mean_of_overlapping_strips_however_dense_they_are():
     points, line = scanned([(0.008, 0.006, 1.0, 3.0, 9000), (-0.008, -0.006, 0.5, 3.0, 3000)])
-    network = refine(single(line), points, HEAD_M)
+    network = refine(network_of(line), points, HEAD_M)
     near = near_lines(network.lines, points.xyz, HEAD_M, points.strips)
     (one,) = elevate(network, near, 10, strips=[measure_strips(near[0])])
     inner = one.xyz[(one.xyz[:, 0] > 3) & (one.xyz[:, 0] < LENGTH_M - 3)]
@@ -120,7 +113,7 @@ def test_aligned_lines_do_not_step_and_state_what_remains():
     points, line = rail([(1, 0.015, 0.0075, 0, middle), (2, -0.015, -0.0075, middle, LENGTH_M)])
     step = {}
     for align in (False, True):
-        network = refine(single(line), points, HEAD_M, align=align)
+        network = refine(network_of(line), points, HEAD_M, align=align)
         near = near_lines(network.lines, points.xyz, HEAD_M, points.strips)
         strips = [measure_strips(one) for one in near]
         (one,) = elevate(network, near, 10, ElevationParameters(align=align), strips=strips)
@@ -138,8 +131,8 @@ def test_points_of_one_strip_are_left_alone():
     assert strips_along([line], replace(points, strips=None)) == [None]
     assert strips_along([line], points) == [None]
     assert rows_of([line], [None]).shape == (0, 7)
-    network = refine(single(line), replace(points, strips=None), HEAD_M)
-    aligned = refine(single(line), replace(points, strips=None), HEAD_M, align=True)
+    network = refine(network_of(line), replace(points, strips=None), HEAD_M)
+    aligned = refine(network_of(line), replace(points, strips=None), HEAD_M, align=True)
     np.testing.assert_array_equal(network.lines[0], aligned.lines[0])
 
 

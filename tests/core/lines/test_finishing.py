@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from built import rail_of
 from heard import Heard
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -152,10 +153,6 @@ def test_no_line_of_a_damaged_network_turns_as_no_rail_can(seed):
     assert all(len(parts_without_turns(rail.xyz[:, :2], 0.0, 0.1, MAX_TURN_DEG + 1.5)) == 1 for rail in rails)
 
 
-def rail(xyz):
-    return RailLine(np.asarray(xyz), 1, 10, points=0, resid_mm=0.0, sigma_mm=0.0, bridged_m=0.0)
-
-
 def arc(radius, length, step=0.05):
     angle = np.arange(0, length / radius, step / radius)
     return radius * np.column_stack([np.sin(angle), 1 - np.cos(angle), 0 * angle])
@@ -164,41 +161,23 @@ def arc(radius, length, step=0.05):
 def test_lines_keep_the_vertices_in_which_others_end():
     main = arc(300.0, 60.0)
     branch = main[517] + np.column_stack([np.arange(20.0), 0.02 * np.arange(20.0) ** 2, np.zeros(20)])
-    alone = thin([rail(main)], 0.002, 0.002)[0].xyz
-    thinned, other = (line.xyz for line in thin([rail(main), rail(branch)], 0.002, 0.002))
+    alone = thin([rail_of(main)], 0.002, 0.002)[0].xyz
+    thinned, other = (line.xyz for line in thin([rail_of(main), rail_of(branch)], 0.002, 0.002))
     assert not (alone == main[517]).all(axis=1).any()
     assert (thinned == other[0]).all(axis=1).any()
     assert len(thinned) <= len(alone) + 2
 
 
-def test_thinned_lines_are_short_and_near():
-    (line,) = thin([rail(arc(300.0, 60.0))], 0.002, 0.002)
-    assert len(line.xyz) < 40
-    middle = 0.5 * (line.xyz[1:] + line.xyz[:-1])
-    assert np.abs(np.hypot(middle[:, 0], middle[:, 1] - 300.0) - 300.0).max() <= 0.002
-    np.testing.assert_array_equal(line.xyz[[0, -1]], arc(300.0, 60.0)[[0, -1]])
-
-
 @pytest.mark.parametrize("radius", [25.0, 190.0, 1200.0])
 def test_thinned_curves_neither_shrink_nor_shift(radius):
     """Chords between vertices of the curve would be inside it, by 1.3 mm on average."""
-    (line,) = thin([rail(arc(radius, 60.0, 0.01))], 0.002, 0.002)
+    (line,) = thin([rail_of(arc(radius, 60.0, 0.01))], 0.002, 0.002)
     at = np.linspace(0, len(line.xyz) - 1, 20_001)
     x, y = (np.interp(at, np.arange(len(line.xyz)), column) for column in line.xyz.T[:2])
     weight = np.hypot(np.gradient(x), np.gradient(y))
     off = np.hypot(x, y - radius) - radius
     assert abs(np.average(off, weights=weight)) < 0.0001
     assert np.abs(off).max() < 0.002
-
-
-def test_dropped_vertices_are_within_the_tolerance():
-    random = np.random.default_rng(2)
-    along = np.arange(0, 60, 0.1)
-    rough = np.column_stack([along, np.cumsum(random.normal(0, 0.001, (600, 2)), axis=0)])
-    (line,) = thin([rail(rough)], 0.002, 0.003)
-    assert len(line.xyz) < 300
-    assert np.abs(np.interp(along, line.xyz[:, 0], line.xyz[:, 1]) - rough[:, 1]).max() < 0.002 + 1e-5
-    assert np.abs(np.interp(along, line.xyz[:, 0], line.xyz[:, 2]) - rough[:, 2]).max() < 0.003 + 1e-5
 
 
 @given(st.integers(0, 10**6), st.floats(1e-3, 0.3), st.floats(1e-3, 0.3))

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from built import check_meeting
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rail_extract.core.lines.ends import cut_back
@@ -32,14 +33,6 @@ def passed_places(network):
     return {(line, *network.nodes[node].tolist()) for node, line, _ in network.passes.tolist()}
 
 
-def check_invariants(network):
-    for line, own in zip(network.lines, network.ends):
-        np.testing.assert_array_equal(line[[0, -1]], network.nodes[own])
-    for node, line, vertex in network.passes:
-        assert 0 < vertex < len(network.lines[line]) - 1
-        np.testing.assert_array_equal(network.lines[line][vertex], network.nodes[node])
-
-
 def new_vertices(count):
     return np.random.default_rng(count).uniform(-1, 1, (count, 2))
 
@@ -52,7 +45,7 @@ def test_a_new_end_is_a_node_and_passes_that_stay_keep_their_places(network, dat
     replaced = data.draw(st.integers(0, len(line) - 2))
     vertices = new_vertices(data.draw(st.integers(1, 5)))
     edited = network.with_end(end, vertices, replaced)
-    check_invariants(edited)
+    check_meeting(edited)
     np.testing.assert_array_equal(edited.from_end(end), np.concatenate([vertices, line[replaced:]]))
     np.testing.assert_array_equal(edited.nodes[edited.ends.flat[end]], vertices[0])
     lost = {(end // 2, *place) for place in line[:replaced].tolist()}
@@ -68,7 +61,7 @@ def test_ends_that_are_cut_back_are_free_and_shorter_by_just_that(network, data)
     ends = data.draw(st.sets(st.integers(0, 2 * len(network.lines) - 1), max_size=4))
     cuts_m = {end: data.draw(st.floats(0.0, 2.4)) for end in ends}
     cut = network.cut_back(cuts_m)
-    check_invariants(cut)
+    check_meeting(cut)
     for number, line in enumerate(network.lines):
         expected = line
         for end in ends & {2 * number, 2 * number + 1}:
@@ -84,10 +77,10 @@ def test_ends_that_are_cut_back_are_free_and_shorter_by_just_that(network, data)
 @settings(max_examples=40, deadline=None)
 def test_lines_parted_at_all_nodes_that_they_pass_weld_to_what_they_were(network):
     pieces, partner = network.parted()
-    check_invariants(pieces)
+    check_meeting(pieces)
     assert len(pieces.lines) == len(network.lines) + len(network.passes)
     again = pieces.weld(partner)
-    check_invariants(again)
+    check_meeting(again)
     assert passed_places(again) == passed_places(network)
     for one, other in zip(network.lines, again.lines):
         np.testing.assert_array_equal(one, other)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from built import check_meeting
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.polynomial.legendre import leggauss
@@ -150,10 +151,7 @@ def turnout():
 def test_lines_of_a_network_still_meet_and_free_ends_stay():
     network = turnout()
     smoothed = smooth_network(network, SIGMA)
-    for line, (start, end) in zip(smoothed.lines, smoothed.ends):
-        np.testing.assert_array_equal(line[[0, -1]], smoothed.nodes[[start, end]])
-    for node, line, vertex in smoothed.passes:
-        np.testing.assert_array_equal(smoothed.lines[line][vertex], smoothed.nodes[node])
+    check_meeting(smoothed)
     np.testing.assert_array_equal(smoothed.nodes[[0, 1, 3]], network.nodes[[0, 1, 3]])
     np.testing.assert_array_equal(smoothed.ends, network.ends)
 
@@ -163,19 +161,6 @@ def test_a_loop_in_a_network_is_smoothed_across_its_seam():
     smoothed = smooth_network(LineNetwork((loop,), loop[:1], np.array([[0, 0]])), SIGMA)
     np.testing.assert_allclose(np.hypot(*smoothed.lines[0].T), 25, atol=1e-4)
     np.testing.assert_array_equal(smoothed.lines[0][0], smoothed.lines[0][-1])
-
-
-def test_a_diamond_keeps_its_crossing_in_both_lines():
-    x = np.arange(-20, 20.05, 0.1)
-    lines = (wavy(x, x / 9, 5), wavy(x, -x / 9, 6))
-    for line in lines:
-        line[200] = 0
-    nodes = np.array([line[i] for line in lines for i in (0, -1)] + [[0.0, 0.0]])
-    network = LineNetwork(lines, nodes, np.array([[0, 1], [2, 3]]), np.array([[4, 0, 200], [4, 1, 200]]))
-    smoothed = smooth_network(network, SIGMA)
-    for node, line, vertex in smoothed.passes:
-        np.testing.assert_array_equal(smoothed.lines[line][vertex], smoothed.nodes[node])
-    assert np.hypot(*smoothed.nodes[4]) < 0.005
 
 
 def test_bending_a_line_equals_one_dense_system():

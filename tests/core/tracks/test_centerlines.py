@@ -2,14 +2,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from built import rails_of
 from rail_extract.core.errors import NoTrackError
 from rail_extract.core.parameters import Parameters
-from rail_extract.core.rails import RailLine
 from rail_extract.core.tracks.centerlines import (
     build_centerlines,
 )
 from rail_extract.laboratory.curves import Element, trace, transition_curve
-from rail_extract.laboratory.rasters.turnouts import FORMS, branch
 from rail_extract.laboratory.ruler.lines import compare_lines
 from rail_extract.laboratory.scenes.tracks import Track
 
@@ -18,15 +17,6 @@ STANDARD = Parameters(GAUGE, WIDTH)
 SPACING = GAUGE + WIDTH
 STRAIGHT = trace([Element(60.0)], heading=0.7)
 CURVED = trace(transition_curve(30, 40, 60, 1 / 300), heading=-0.6)
-
-
-def rails_of(*lines, **fields):
-    fields = {"class_code": 10, "points": 0, "resid_mm": 0.0, "sigma_mm": 0.0, "bridged_m": 0.0, **fields}
-    return [RailLine(np.asarray(line), number, **fields) for number, line in enumerate(lines, start=1)]
-
-
-def flat(xy):
-    return np.column_stack([xy, np.zeros(len(xy))])
 
 
 def track(curve, left_m=0.0, spacing=SPACING, height=0.0, cant=0.0):
@@ -46,8 +36,7 @@ def without(line, start, end):
 def test_centerline_of_concentric_arcs_is_the_arc_between(radius, turned):
     angle = np.linspace(0, min(30 / radius, 2.5), 800)
     arcs = [
-        flat(ring * np.column_stack([np.cos(angle), np.sin(angle)]))
-        for ring in radius + SPACING * np.array([0.5, -0.5])
+        (ring * np.column_stack([np.cos(angle), np.sin(angle)])) for ring in radius + SPACING * np.array([0.5, -0.5])
     ]
     (line,) = build_centerlines(rails_of(arcs[0], arcs[1][::-1] if turned else arcs[1]), STANDARD)
     tolerance = 1e-4 if radius > 100 else 4e-4  # in the tightest curve the chords between stations show
@@ -62,7 +51,7 @@ def test_a_ring_becomes_one_closed_centerline(begins, turned):
     """Wherever its two rails start, and in whichever direction they run."""
     angle = np.linspace(0, 2 * np.pi, 1500)
     outer, inner = (
-        flat(radius * np.column_stack([np.cos(angle + start), np.sin(angle + start)]))
+        (radius * np.column_stack([np.cos(angle + start), np.sin(angle + start)]))
         for radius, start in ((30 + 0.5 * SPACING, 1.0), (30 - 0.5 * SPACING, 1.0 + begins))
     )
     outer[-1], inner[-1] = outer[0], inner[0]
@@ -115,33 +104,6 @@ def test_gaps_in_both_rails_are_bridged_up_to_the_maximum(gap, count):
     found = build_centerlines(rails_of(*parts), STANDARD)
     assert len(found) == count
     assert compare_lines([line.xyz for line in found], [middle]).lateral_p95_m < 0.012
-
-
-def test_long_tracks_are_one_line():
-    curve = trace([Element(1500.0, 1 / 3000, 1 / 3000)], step_m=0.1)
-    left, right, _ = track(curve)
-    (line,) = build_centerlines(rails_of(left, right), STANDARD)
-    assert line.length_m == pytest.approx(1500.0, abs=0.5)
-    assert (line.left_ids, line.right_ids) in (((1,), (2,)), ((2,), (1,)))
-
-
-@pytest.mark.parametrize("form", [form for form in FORMS if form.name in ("190-1:7.5", "300-1:9", "760-1:14")])
-@pytest.mark.parametrize("hand", [1, -1])
-def test_turnouts_fork_into_two_centerlines(form, hand):
-    main = trace([Element(110.0)], heading=0.3)
-    side = branch(main, 20.0, form, hand, 25.0)
-    outer, inner, through = track(main)
-    branch_left, branch_right, diverging = track(side)
-    # The rails of the branch start where they are a head's width away from the stock rails.
-    rails = rails_of(
-        outer, inner, *(line[np.linalg.norm(line - line[0], axis=1) > 8.0] for line in (branch_left, branch_right))
-    )
-    found = build_centerlines(rails, STANDARD)
-    assert len(found) == 2
-    result = compare_lines([line.xyz for line in found], [through, diverging])
-    assert result.correctness > 0.995
-    assert result.completeness > 0.995
-    assert max(line.length_m for line in found) == pytest.approx(110.0, abs=1.0)
 
 
 @pytest.mark.parametrize("cant", [0.0, 0.1])

@@ -2,21 +2,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from built import centerline_of, cloud_of, rails_of, rms
 from rail_extract.core import pipeline
-from rail_extract.core.clouds.points import RailPoints
-from rail_extract.core.frame import LocalFrame
-from rail_extract.core.heads.elevation import elevate, measure_again
-from rail_extract.core.heads.head_points import near_lines
-from rail_extract.core.heads.refinement import refine
-from rail_extract.core.lines.finishing import thin
-from rail_extract.core.lines.smoothing import smooth_network
 from rail_extract.core.parameters import Parameters
-from rail_extract.core.rails import NO_GAPS, Centerline, RailLine, Support
-from rail_extract.core.raster import cell_size, rasterize
+from rail_extract.core.rails import Centerline, Support
 from rail_extract.core.squares import steps
 from rail_extract.core.tracks.centerlines import build_centerlines
 from rail_extract.core.tracks.geometry import measure_track_geometry
-from rail_extract.core.vectorize import vectorize
 from rail_extract.laboratory.curves import Element, trace, transition_curve
 from rail_extract.laboratory.scenes.scanner import Scanner, scan
 from rail_extract.laboratory.scenes.tracks import Track
@@ -34,15 +26,6 @@ def curved_track(sign=1, heading=0.2):
     return Track(curve, GAUGE + WIDTH, 0.004 * curve.chainage, cant)
 
 
-def rail_lines(*lines, **fields):
-    fields = {"class_code": 10, "points": 0, "resid_mm": 0.0, "sigma_mm": 0.0, "bridged_m": 0.0, **fields}
-    return [RailLine(np.asarray(line), number, **fields) for number, line in enumerate(lines, start=1)]
-
-
-def rms(values):
-    return np.sqrt(np.nanmean(values**2))
-
-
 def ramp(chainage, height):
     """A quantity that follows the curvature."""
     return np.interp(chainage, BORDERS[1:5], [0.0, height, height, 0.0])
@@ -53,7 +36,7 @@ def ramp(chainage, height):
 def test_exact_rails_give_exact_geometry(sign, turned):
     """One of the rails may be reversed: only the direction of the centerline counts."""
     left, right = curved_track(sign).rails()
-    rails = rail_lines(left[::-1] if turned else left, right)
+    rails = rails_of(left[::-1] if turned else left, right)
     lines = build_centerlines(rails, Parameters(GAUGE, WIDTH))
     (found,) = measure_track_geometry(lines, rails, WIDTH)
     t = found.chainage_m
@@ -74,37 +57,11 @@ def test_exact_rails_give_exact_geometry(sign, turned):
     assert not found.bridged.any()
 
 
-@pytest.mark.parametrize("stored", [False, True])
-def test_a_scanned_track_is_measured_to_millimetres(stored):
-    """Within one run, and from thinned lines as stored in files."""
-    track = curved_track()
-    random = np.random.RandomState(5)
-    heads = [scan(track.railhead(side), WIDTH, track.centerline, Scanner(), random) for side in (1, -1)]
-    points = RailPoints(np.concatenate(heads), LocalFrame(np.zeros(3)), 10)
-    network = smooth_network(vectorize(rasterize(points.xyz, cell_size(GAUGE, WIDTH)), WIDTH), 0.8)
-    network = refine(network, points, WIDTH)
-    rails = elevate(network, near_lines(network.lines, points.xyz, WIDTH), 10)
-    lines = build_centerlines(rails, Parameters(GAUGE, WIDTH))
-    if stored:
-        rails, lines = thin(rails, 0.002, 0.002), thin(lines, 0.002, 0.002)
-        rails = [replace(rail, support=None, gaps=NO_GAPS) for rail in rails]
-    (found,) = measure_track_geometry(lines, measure_again(rails, points, WIDTH), WIDTH)
-    t = found.chainage_m
-    assert rms(found.gauge_mm - 1435.0) < 2.0
-    assert rms(found.cant_mm - ramp(t, -CANT_MM)) < 1.0
-    assert rms(found.grade_pm - 4.0) < 0.2
-    arc = (t > BORDERS[2] + 10) & (t < BORDERS[3] - 10)
-    np.testing.assert_allclose(found.radius_m[arc], RADIUS, rtol=0.02)
-    assert 0.2 < rms(found.sigma_mm) < 2.0
-    assert found.points.sum() == pytest.approx(sum(rail.points for rail in rails), rel=0.1)
-    assert not found.bridged.any()
-
-
 @pytest.mark.parametrize(("step", "chainage"), [(100, [0, 100, 199]), (150, [0, 199]), (300, [0, 199])])
 def test_stations_cover_the_whole_track(step, chainage):
     left, right = Track(trace([Element(199.0)]), GAUGE + WIDTH).rails()
-    line = Centerline(0.5 * (left + right), 1, 10, (1,), (2,), 1435.0, 0.0, 0.0, 0.0, 0.0)
-    rails = [replace(rail, gaps=np.array([[0.0, 199.0]]), points=398) for rail in rail_lines(left, right)]
+    line = centerline_of(0.5 * (left + right))
+    rails = [replace(rail, gaps=np.array([[0.0, 199.0]]), points=398) for rail in rails_of(left, right)]
     (found,) = measure_track_geometry([line], rails, WIDTH, step)
     np.testing.assert_allclose(found.chainage_m, chainage)
     assert found.points.sum() == 796
@@ -113,9 +70,9 @@ def test_stations_cover_the_whole_track(step, chainage):
 
 def test_gauge_and_cant_are_unknown_where_a_rail_is_missing():
     left, right = Track(trace([Element(40.0)]), GAUGE + WIDTH).rails()
-    line = Centerline(0.5 * (left + right), 1, 10, (1,), (2,), 1435.0, 0.0, 0.0, 0.0, 0.0)
+    line = centerline_of(0.5 * (left + right))
     short = right[right[:, 0] < 30]
-    (found,) = measure_track_geometry([line], rail_lines(left, short), WIDTH)
+    (found,) = measure_track_geometry([line], rails_of(left, short), WIDTH)
     gone = found.chainage_m > short[-1, 0] + 1.7
     assert gone.sum() > 7
     for values in (found.gauge_mm, found.cant_mm):
@@ -128,8 +85,8 @@ def test_points_are_counted_once_around_a_ring():
     rings = [np.column_stack([r * np.cos(angle), r * np.sin(angle), 0 * angle]) for r in (9.2465, 10.7535, 10.0)]
     for ring, turn in zip(rings, (130, 40, 0)):
         ring[:] = np.roll(ring[:-1], turn, axis=0)[np.r_[0:399, 0]]
-    rails = [replace(rail, points=1000) for rail in rail_lines(*rings[:2])]
-    line = Centerline(rings[2], 1, 10, (1,), (2,), 1435.0, 0.0, 0.0, 0.0, 0.0)
+    rails = [replace(rail, points=1000) for rail in rails_of(*rings[:2])]
+    line = centerline_of(rings[2])
     (found,) = measure_track_geometry([line], rails, WIDTH)
     assert found.points.sum() == pytest.approx(2000, rel=0.03)
     assert found.points.max() < 2 * np.median(found.points)
@@ -141,10 +98,10 @@ def test_support_follows_the_chainage():
     stations = np.arange(0.125, 40, 0.25)
     even = Support(stations, np.full(160, 10), np.full(160, 0.003))
     uneven = Support(stations, np.where(stations < 20, 10, 2), np.where(stations < 20, 0.004, 0.008))
-    first, second = rail_lines(left, right)
+    first, second = rails_of(left, right)
     first = replace(first, gaps=np.array([[5.1, 8.1]]), support=even)
     second = replace(second, support=uneven)
-    line = Centerline(0.5 * (left + right)[::-1], 1, 10, (2,), (1,), 1435.0, 0.0, 0.0, 0.0, 3.0)
+    line = centerline_of(0.5 * (left + right)[::-1], left_ids=(2,), right_ids=(1,))
     (found,) = measure_track_geometry([line], [first, second], WIDTH, step_m=0.5)
     t = 40 - found.chainage_m
     np.testing.assert_array_equal(found.bridged, (t > 5.1) & (t < 8.1))
@@ -158,7 +115,7 @@ def test_lines_from_other_software_are_measured_without_ids_or_heights():
     left, right = curved_track().rails()
     middle = curved_track().centerline[::50, :2]
     line = Centerline(np.column_stack([middle, np.full(len(middle), np.nan)]), 7, 0, (), (), *[np.nan] * 5)
-    rails = rail_lines(left * [1, 1, np.nan], right * [1, 1, np.nan])
+    rails = rails_of(left * [1, 1, np.nan], right * [1, 1, np.nan])
     (found,) = measure_track_geometry([line], rails, WIDTH)
     assert found.track_id == 7
     np.testing.assert_allclose(found.gauge_mm, 1435.0, atol=2.5)  # in plan: cant accounts for 2 mm
@@ -169,15 +126,15 @@ def test_lines_from_other_software_are_measured_without_ids_or_heights():
 
 def test_short_and_single_lines_give_what_can_be_measured():
     left, right = Track(trace([Element(2.0)]), GAUGE + WIDTH).rails()
-    line = Centerline(0.5 * (left + right), 1, 10, (1,), (2,), 1435.0, 0.0, 0.0, 0.0, 0.0)
-    (short,) = measure_track_geometry([line], rail_lines(left, right), WIDTH)
+    line = centerline_of(0.5 * (left + right))
+    (short,) = measure_track_geometry([line], rails_of(left, right), WIDTH)
     np.testing.assert_allclose(short.chainage_m, [0, 1, 2])
     np.testing.assert_allclose(short.gauge_mm, 1435.0, atol=1e-6)
     assert np.isnan(short.radius_m).all()
-    (alone,) = measure_track_geometry([line], rail_lines(left), WIDTH)
+    (alone,) = measure_track_geometry([line], rails_of(left), WIDTH)
     assert np.isnan(alone.gauge_mm).all()
     assert alone.bridged.all()
-    assert measure_track_geometry([], rail_lines(left, right), WIDTH) == ()
+    assert measure_track_geometry([], rails_of(left, right), WIDTH) == ()
 
 
 class RawRaster:
@@ -195,8 +152,7 @@ def test_one_run_measures_every_track_of_every_class_on_request(monkeypatch):
     track = Track(trace([Element(30.0)], heading=0.3), GAUGE + WIDTH, cant_m=0.02)
     random = np.random.RandomState(1)
     heads = [scan(track.railhead(side), WIDTH, track.centerline, Scanner(), random) for side in (1, -1)]
-    xyz, frame = np.concatenate(heads), LocalFrame(np.zeros(3))
-    clouds = [RailPoints(xyz, frame, 11), RailPoints(xyz + [0.0, 20.0, 0.0], frame, 10)]
+    clouds = [cloud_of(*heads, code=11), cloud_of(*(head + [0.0, 20.0, 0.0] for head in heads))]
     network = pipeline.extract_rails(clouds, pipeline.Parameters(GAUGE, WIDTH, quality_step_m=2.0))
     assert [found.track_id for found in network.geometry] == [line.track_id for line in network.centerlines] == [1, 2]
     for found, line in zip(network.geometry, network.centerlines):
@@ -210,7 +166,7 @@ def test_one_run_measures_every_track_of_every_class_on_request(monkeypatch):
 @pytest.mark.parametrize("step_m", [0.25, 1.0, 3.0])
 def test_points_of_stations_add_up_to_those_of_the_rails(step_m):
     left, right = curved_track().rails()
-    rails = rail_lines(left, right, points=60)
+    rails = rails_of(left, right, points=60)
     (found,) = measure_track_geometry(build_centerlines(rails, Parameters(GAUGE, WIDTH)), rails, WIDTH, step_m)
     assert abs(found.points.sum() - 120) <= 1
 
@@ -219,6 +175,6 @@ def test_a_millimetre_does_not_make_a_radius_on_a_short_piece():
     x = np.arange(0, 3.3, 0.1)
     sag = 0.001 * np.sin(np.pi * x / x[-1])  # versine 1 mm: a radius of 1.3 km
     left, right = (np.column_stack([x, sag + side * 0.5 * (GAUGE + WIDTH), 0 * x]) for side in (1, -1))
-    rails = rail_lines(left, right)
+    rails = rails_of(left, right)
     (found,) = measure_track_geometry(build_centerlines(rails, Parameters(GAUGE, WIDTH)), rails, WIDTH)
     assert np.isnan(found.radius_m).all()

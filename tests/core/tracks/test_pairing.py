@@ -2,8 +2,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from built import beside, rails_of, tracks
 from rail_extract.core.parameters import Parameters
-from rail_extract.core.rails import RailLine
 from rail_extract.core.tracks.pairing import (
     pair_rails,
 )
@@ -12,23 +12,6 @@ from rail_extract.laboratory.curves import Element, trace, transition_curve
 GAUGE, WIDTH = 1.435, 0.072
 STANDARD = Parameters(GAUGE, WIDTH)
 SPACING = GAUGE + WIDTH
-
-
-def rail(xy, number=1, code=10, z=0.0):
-    xyz = np.column_stack([xy, np.broadcast_to(z, len(xy))])
-    return RailLine(xyz, number, code, points=0, resid_mm=0.0, sigma_mm=0.0, bridged_m=0.0)
-
-
-def rails_of(*lines):
-    return [rail(line, number) for number, line in enumerate(lines, start=1)]
-
-
-def beside(curve, *offsets):
-    return [curve.offset(offset)[::10] for offset in offsets]
-
-
-def tracks(curve, *axes, spacing=SPACING):
-    return beside(curve, *(axis + side * spacing / 2 for axis in axes for side in (1, -1)))
 
 
 STRAIGHT = trace([Element(60.0)], heading=0.7)
@@ -82,7 +65,7 @@ def test_a_rail_shared_by_two_tracks_belongs_to_both():
 @pytest.mark.parametrize(("height", "count"), [(0.0, 1), (0.18, 1), (6.5, 0), (np.nan, 1)])
 def test_rails_on_two_levels_are_not_a_track(height, count):
     left, right = tracks(STRAIGHT, 0.0)
-    assert len(pair_rails([rail(left), rail(right, 2, z=height)], STANDARD)) == count
+    assert len(pair_rails(rails_of(left, np.column_stack([right, np.full(len(right), height)])), STANDARD)) == count
 
 
 @pytest.mark.parametrize(("widening", "count"), [(0.04, 1), (-0.04, 1), (0.06, 0), (-0.06, 0)])

@@ -1,33 +1,16 @@
 """Stations abreast of each other on parallel rails, and the most common spacing."""
 
-import numpy as np
 import pytest
+from built import rails_of, tracks
 from rail_extract.core.progress import Progress, Recording
-from rail_extract.core.rails import RailLine
 from rail_extract.core.tracks.parallels import find_parallels, most_common_spacing, widths_by_gauge
 from rail_extract.laboratory.curves import Element, trace, transition_curve
 
 GAUGES = ((1.435, 0.072), (1.0, 0.066))
 WIDE, NARROW = (sum(one) for one in GAUGES)
 
-SPACING = 1.507
 STRAIGHT = trace([Element(60.0)], heading=0.7)
 CURVED = trace(transition_curve(30, 40, 60, 1 / 300), heading=2.0)
-
-
-def rails_of(*lines):
-    return [
-        RailLine(np.column_stack([line, np.zeros(len(line))]), number, 10, 0, 0.0, 0.0, 0.0)
-        for number, line in enumerate(lines, start=1)
-    ]
-
-
-def beside(curve, *offsets):
-    return [curve.offset(offset)[::10] for offset in offsets]
-
-
-def tracks(curve, *axes, spacing=SPACING):
-    return beside(curve, *(axis + side * spacing / 2 for axis in axes for side in (1, -1)))
 
 
 @pytest.mark.parametrize("spacing", [1.0619, 1.507, 1.592, 1.743])
@@ -48,11 +31,6 @@ def test_a_crowd_of_lines_is_left_out_with_a_warning():
     assert not len(find_parallels(rails_of(*copies)).a)
 
 
-def rails_at(*lefts, length_m=20.0):
-    lines = [np.column_stack([[0.0, length_m], [left, left], [np.nan, np.nan]]) for left in lefts]
-    return [RailLine(line, number, 10, 0, np.nan, np.nan, np.nan) for number, line in enumerate(lines, start=1)]
-
-
 @pytest.mark.parametrize(
     ("lefts", "widths"),
     [
@@ -64,4 +42,4 @@ def rails_at(*lefts, length_m=20.0):
     ],
 )
 def test_each_rail_has_the_width_of_its_track(lefts, widths):
-    assert widths_by_gauge(rails_at(*lefts), GAUGES, 0.05).tolist() == widths
+    assert widths_by_gauge(rails_of(*([[0.0, left], [20.0, left]] for left in lefts)), GAUGES, 0.05).tolist() == widths

@@ -2,13 +2,11 @@
 
 import numpy as np
 import pytest
-from rail_extract.core.lines.ends import MISFIT_M, even_points
+from built import check_meeting
+from rail_extract.core.lines.ends import MISFIT_M
 from rail_extract.core.lines.network import LineNetwork
-from rail_extract.core.raster import cell_size, rasterize
-from rail_extract.core.vectorize import vectorize
 from rail_extract.core.vectorize.branches import attach_branches, part_branches
 from rail_extract.laboratory.curves import Element, trace
-from rail_extract.laboratory.scenes.switches import turnout
 from scipy.spatial import cKDTree
 
 
@@ -45,30 +43,8 @@ def test_a_branch_that_ends_freely_is_extended_tangentially_to_its_stock_rail(ra
     loose = LineNetwork(lines, np.concatenate([line[[0, -1]] for line in lines]), np.arange(4).reshape(2, 2))
     network = attach_branches(loose, cKDTree(np.concatenate([stock, arc])), 5.0)
     assert sorted(network.degrees()) == [1, 1, 1, 3]
-    (node, line, vertex) = network.passes[0]
-    np.testing.assert_array_equal(network.lines[line][vertex], network.nodes[node])
+    check_meeting(network)
+    ((node, line, _),) = network.passes
     np.testing.assert_array_equal(network.lines[line], stock)
     assert network.nodes[node][0] == pytest.approx(10 + np.sqrt(2 * radius * MISFIT_M), abs=0.2)
     assert cKDTree(np.concatenate([stock, arc])).query(network.lines[1])[0].max() < 0.06
-
-
-def follows(line, rails):
-    """Numbers of the rails that a line follows, where no other rail is near it."""
-    distance = np.array([rail.query(even_points(line))[0] for rail in rails])
-    alone = np.partition(distance, 1, axis=0)[1] > 0.2
-    return set(distance[:, alone].argmin(axis=0).tolist())
-
-
-@pytest.mark.parametrize(
-    ("form", "hand", "heading", "seed", "curvature"),
-    [("2500-1:26.5", -1, 3.29, 207, 0.0), ("2500-1:26.5", -1, 0.47, 201, 0.0)],
-)
-def test_every_line_of_a_scanned_turnout_follows_one_rail_alone(form, hand, heading, seed, curvature):
-    scene = turnout("turnout", form, hand, heading, seed, curvature)
-    head_m = scene.standard.head_width_m
-    rails = [cKDTree(even_points(rail[:, :2])) for rail in scene.rails]
-    xyz = scene.rail_points().xyz
-    seen = np.min([rail.query(xyz[:, :2])[0] for rail in rails], axis=0) < head_m / 2
-    network = vectorize(rasterize(xyz[seen], cell_size(scene.standard.gauge_m, head_m)), head_m)
-    followed = [follows(line, rails) for line in network.lines]
-    assert sorted(followed, key=min) == [{0}, {1}, {2}, {3}]

@@ -4,6 +4,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from built import check_meeting
 from heard import Heard
 from rail_extract.core.errors import Cancelled
 from rail_extract.core.lines.smoothing import smooth_network
@@ -51,14 +52,6 @@ def arc(length, radius, heading=0.3):
 
 def smoothed(raster, **parameters):
     return smooth_network(vectorize(raster, HEAD_M, **parameters), 0.8).lines
-
-
-def check_invariants(network):
-    for line, (start, end) in zip(network.lines, network.ends):
-        np.testing.assert_array_equal(line[[0, -1]], network.nodes[[start, end]])
-    for node, line, vertex in network.passes:
-        np.testing.assert_array_equal(network.lines[line][vertex], network.nodes[node])
-    assert (network.degrees() > 0).all()
 
 
 @pytest.mark.parametrize(
@@ -122,7 +115,7 @@ def scene(seed):
 def test_three_noisy_tracks_with_gaps_give_one_line_per_rail(seed):
     raster, rails = scene(seed)
     network = vectorize(raster, HEAD_M)
-    check_invariants(network)
+    check_meeting(network)
     lines = smooth_network(network, 0.8).lines
     assert 6 <= len(lines) <= 8
     off = cKDTree(np.concatenate([dense(rail, 0.01) for rail in rails]))
@@ -196,31 +189,6 @@ def test_the_nearer_of_two_rails_that_end_is_not_preferred_to_the_straight_one()
     assert offsets(line, rail).max() < 0.03
 
 
-def test_a_branch_ends_in_the_through_rail():
-    through = straight(40, 0.2)
-    turn = np.array([[1, -1 / 9], [1 / 9, 1]])
-    branch = np.array([through.mean(axis=0), through.mean(axis=0) + turn @ (through[1] - through[0]) * 0.4])
-    network = vectorize(draw([through, branch]), HEAD_M)
-    check_invariants(network)
-    assert sorted(network.degrees()) == [1, 1, 1, 3]
-    lengths = sorted(network.lengths())
-    assert lengths[1] > 39.5
-    assert network.passes[0, 1] == np.argmax(network.lengths())
-    smooth = smooth_network(network, 0.8)
-    check_invariants(smooth)
-    assert offsets(smooth.lines[network.passes[0, 1]], through).max() < 0.06
-
-
-@pytest.mark.parametrize("slope", [1 / 6, 1 / 9, 1 / 14])
-def test_rails_that_cross_are_two_straight_lines(slope):
-    angle = np.arctan(slope) / 2
-    rails = [np.outer([-25, 25], [np.cos(0.4 + a), np.sin(0.4 + a)]) for a in (angle, -angle)]
-    lines = smoothed(draw(rails))
-    assert len(lines) == 2
-    for line in lines:
-        assert min(offsets(line, rail).max() for rail in rails) < 0.015
-
-
 @pytest.mark.parametrize(
     ("name", "curvature"), [("tram 25", 0.0), ("190-1:9", 0.0), ("300-1:9", 1 / 400), ("500-1:12", 0.0)]
 )
@@ -230,7 +198,7 @@ def test_a_turnout_has_two_rails_through_and_two_that_begin_where_they_part(name
     side = branch(main, 25.0, form, -1, 20.0)
     rails = [curve.offset(left) for curve in (main, side) for left in (-0.7556, 0.7556)]
     network = vectorize(draw(rails), HEAD_M)
-    check_invariants(network)
+    check_meeting(network)
     assert len(network.lines) == 4
     assert sorted(network.degrees()) == [1] * 6 + [3] * 2
     lines = smooth_network(network, 0.8).lines
