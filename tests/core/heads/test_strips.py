@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from built import cloud_of, network_of
+from built import centerline_of, cloud_of, network_of
 from rail_extract.core.heads.elevation import ElevationParameters, elevate
 from rail_extract.core.heads.head_points import near_lines
 from rail_extract.core.heads.refinement import refine
@@ -13,7 +13,6 @@ from rail_extract.core.heads.strips import (
     rows_of,
     strip_courses,
 )
-from rail_extract.core.rails import Centerline
 from rail_extract.laboratory.scenes.scanner import Scanner, scan
 from rail_extract.laboratory.scenes.tracks import Railhead
 
@@ -147,15 +146,18 @@ def test_rows_state_places_and_offsets_in_the_plane():
     np.testing.assert_allclose(rows[rows[:, 2] == 8, 3].mean(), 0.010, atol=0.001)
 
 
+COURSE_M = 20.0
+"""Length of tracks that strips cover."""
+
+
 def centerline(start, way, track_id):
-    xy = np.array([start, np.add(start, LENGTH_M * way)])
-    return Centerline(np.column_stack([xy, np.zeros(2)]), track_id, 10, (1,), (2,), 1435.0, 1.0, 0.0, 0.0, 0.0)
+    return centerline_of([[*start, 0.0], [*np.add(start, COURSE_M * way), 0.0]], track_id)
 
 
 def rows(start, way, strip, left_m, up_m, aside_m):
     """Stations every half metre on a rail beside a track, at which a strip is off by this."""
     left = np.array([-way[1], way[0]])
-    places = np.add(start, np.arange(0.25, LENGTH_M, 0.5)[:, None] * way + aside_m * left)
+    places = np.add(start, np.arange(0.25, COURSE_M, 0.5)[:, None] * way + aside_m * left)
     count = len(places)
     values = [np.full(count, strip), *np.tile(left_m * left, (count, 1)).T, np.full(count, up_m), np.full(count, 9)]
     return np.column_stack([places, *values])
@@ -178,7 +180,7 @@ def test_each_strip_of_each_track_has_its_offsets_along_it():
     )
     assert [(one.track_id, one.strip) for one in found] == [(4, 1), (4, 2), (7, 2)]
     for one, across_mm, up_mm in zip(found, (15, -15, 8), (-5, 5, 1)):
-        assert one.chainage_m == pytest.approx(np.arange(0.5, LENGTH_M))
+        assert one.chainage_m == pytest.approx(np.arange(0.5, COURSE_M))
         assert one.across_mm == pytest.approx(across_mm)
         assert one.up_mm == pytest.approx(up_mm)
 
