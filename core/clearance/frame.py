@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -27,9 +28,6 @@ half a millimetre 4 m aside."""
 CURVATURE_M = 15.0
 """Length over which curvature is the slope of the direction: shorter than the shortest transition curve."""
 
-CELL_M = 1.0
-"""Side of the cells that lead from a point to the station near it."""
-
 HALF_SPACING_M = 0.75
 """Distance of a rail's middle from the centerline where the gauge is not stated: that of standard gauge."""
 
@@ -39,9 +37,6 @@ HEAD_M = 0.07
 RAIL_REACH_M = 0.35
 """A rail is looked for within this distance of its expected place: less than half of the narrowest spacing, so that the
 rail of another branch is none."""
-
-SAME_PLACE_M = 0.10
-"""Largest difference between the distances of both rails from the centerline of their own track."""
 
 LINE_SIGMA_M, CANT_SIGMA_M = 0.0010, 0.0006
 """Standard errors of the centerline across and of the cant where the rails state none: those of dense mobile lidar."""
@@ -54,9 +49,6 @@ LEAST_NOISE_M, USUAL_NOISE_M = 0.003, 0.005
 
 BESIDE_M = 0.5 * STEP_M
 """A point whose foot is further along than this is nearer to another station."""
-
-MIN_LENGTH_M = 3.0
-"""Shorter lines have no direction that could be measured."""
 
 
 @dataclass(frozen=True)
@@ -77,8 +69,8 @@ class Course:
         Where a rail has no points and its height is interpolated.
     wide_m : (n, 2) array
         What the profile is widened by on the left and on the right.
-    gauge_m, beside_m : float, (float, float)
-        Measured gauge; median distances of the left and of the right rail from the line. NaN if unknown.
+    gauge_m : float
+        Measured gauge; NaN if unknown.
     sigma_m, cant_sigma_m, noise_m : float
         Standard errors of the line across, of the cant, and of a point. Where the cant is unknown, its error holds all
         of it.
@@ -99,7 +91,6 @@ class Course:
     bridged: np.ndarray
     wide_m: np.ndarray
     gauge_m: float
-    beside_m: tuple[float, float]
     sigma_m: float
     cant_sigma_m: float
     noise_m: float
@@ -138,6 +129,16 @@ class Course:
     def station(self, s: np.ndarray) -> np.ndarray:
         """Return the number of the station nearest to chainages."""
         return np.clip(np.rint(s / self.step_m) - self.first, 0, len(self.xyz) - 1).astype(np.int64)
+
+    @cached_property
+    def _tree(self) -> cKDTree:
+        return cKDTree(self.xyz[:, :2])
+
+    def near(self, xy: np.ndarray, reach_m: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return which places, (m, 2), are within reach in plan, and the station nearest to each of these."""
+        away, station = self._tree.query(xy, distance_upper_bound=reach_m)
+        within = np.flatnonzero(np.isfinite(away))
+        return within, station[within]
 
     def located(self, xyz: np.ndarray, station: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return s, v and w of points, (m, 3), given a station near each; s is NaN beyond the ends of the line."""
@@ -195,7 +196,6 @@ def course_of(line: Centerline, rails: Sequence[RailLine]) -> Course:
     has_cant = bool(np.isfinite(between).any())
     doubt_m = line.cantmax_mm / 1000 if np.isfinite(line.cantmax_mm) else UNKNOWN_CANT_M
     cant_sigma_m = _mean_error([rail.sigmaz_mm for rail in rails], CANT_SIGMA_M, 2**0.5)
-    left_m, right_m = (_median(np.hypot(*(one - xyz)[:, :2].T)) for one in feet)
     return Course(
         track_id=line.track_id,
         step_m=step_m,
@@ -208,7 +208,6 @@ def course_of(line: Centerline, rails: Sequence[RailLine]) -> Course:
         bridged=bridged,
         wide_m=np.zeros((len(xyz), 2)),
         gauge_m=line.gauge_mm / 1000,
-        beside_m=(left_m, right_m),
         sigma_m=_mean_error([rail.sigma_mm for rail in rails], LINE_SIGMA_M, 0.5**0.5),
         cant_sigma_m=cant_sigma_m if has_cant else float(np.hypot(doubt_m, cant_sigma_m)),
         noise_m=max(_mean_error([rail.resid_mm for rail in rails], USUAL_NOISE_M), LEAST_NOISE_M),
@@ -238,12 +237,6 @@ def _feet(
     return feet, bridged | ~np.isfinite(feet).all(axis=(0, 2))
 
 
-def _median(values: np.ndarray) -> float:
-    """Return the median of the values, (n,), that are known; NaN if none is."""
-    known = values[np.isfinite(values)]
-    return float(np.median(known)) if len(known) else np.nan
-
-
 def _filled(t: np.ndarray, values: np.ndarray, default: float) -> np.ndarray:
     """Interpolate values, (n,), across NaN; beyond the first and last, they stay; without any, the default."""
     known = np.isfinite(values)
@@ -254,37 +247,3 @@ def _mean_error(values_mm: Sequence[float], default_m: float, factor: float = 1.
     """Return the root mean square of stated errors, metres; a default if none is stated."""
     known = np.array([value for value in values_mm if np.isfinite(value) and value > 0])
     return factor * float(np.sqrt(np.mean(known**2))) / 1000 if len(known) else default_m
-
-
-@dataclass(frozen=True)
-class Cells:
-    """Cells around a track: their numbers, rising, and the station nearest to each, (m,) each."""
-
-    number: np.ndarray
-    station: np.ndarray
-
-    @classmethod
-    def around(cls, course: Course, reach_m: float) -> Cells:
-        """Return the cells within reach of a track."""
-        xy = course.xyz[:, :2]
-        steps = np.arange(-int(np.ceil(reach_m / CELL_M)), int(np.ceil(reach_m / CELL_M)) + 1)
-        block = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
-        cells = np.unique(np.floor(xy / CELL_M).astype(np.int64), axis=0)
-        cells = np.unique((cells[:, None] + block).reshape(-1, 2), axis=0)
-        away, nearest = cKDTree(xy).query((cells + 0.5) * CELL_M, distance_upper_bound=reach_m + CELL_M)
-        near = np.isfinite(away)
-        number = _numbers(cells[near])
-        order = np.argsort(number)
-        return cls(number[order], nearest[near][order])
-
-    def find(self, xy: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return which points, (m, 2), are within reach, and the stations near these."""
-        number = _numbers(np.floor(xy / CELL_M).astype(np.int64))
-        at = np.minimum(np.searchsorted(self.number, number), len(self.number) - 1)
-        near = np.flatnonzero(self.number[at] == number)
-        return near, self.station[at[near]]
-
-
-def _numbers(cells: np.ndarray) -> np.ndarray:
-    """Return a number for each cell, given by column and row, (m, 2)."""
-    return cells[:, 0] * 2**31 + cells[:, 1]

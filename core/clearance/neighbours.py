@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..polyline import Polyline, runs
-from .frame import Course
+from .frame import STEP_M, Course
 from .settings import Settings
 
 REACH_M = 8.0
@@ -86,15 +86,17 @@ def _beside(own: Course, other: Course) -> np.ndarray:
     (3, n) metres at the stations of the first; NaN where the other one is not near. The cant is 0 where the outer track
     has less.
     """
-    feet = Polyline(other.xyz, other.s).feet(own.xyz[:, :2], REACH_M)
-    same = np.cos(own.heading[feet.point] - other.at(feet.t, other.heading))
-    kept = np.abs(same) > np.cos(np.radians(PARALLEL_DEG))
-    mine, theirs, same = feet.point[kept], other.station(feet.t[kept]), same[kept]
-    above = other.at(feet.t[kept], other.xyz[:, 2]) - own.xyz[mine, 2]
-    more = np.abs(other.cant_m[theirs]) - np.abs(own.cant_m[mine])
-    is_outside = np.abs(other.curvature[theirs]) < np.abs(own.curvature[mine])
+    mine, nearest = other.near(own.xyz[:, :2], REACH_M + STEP_M)
+    at, across = Polyline(other.xyz, other.s).feet_near(own.xyz[mine, :2], other.s[nearest])
+    same = np.cos(own.heading[mine] - other.heading[nearest])
+    above = np.interp(at, other.s, other.xyz[:, 2]) - own.xyz[mine, 2]
+    more = np.abs(other.cant_m[nearest]) - np.abs(own.cant_m[mine])
+    is_outside = np.abs(other.curvature[nearest]) < np.abs(own.curvature[mine])
+    rows = np.array([-across * np.sign(same), above, np.maximum(np.where(is_outside, more, -more), 0.0)])
+    with np.errstate(invalid="ignore"):
+        beside = (np.abs(across) <= REACH_M) & (np.abs(same) > np.cos(np.radians(PARALLEL_DEG)))
     found = np.full((3, len(own.xyz)), np.nan)
-    found[:, mine] = [-feet.across[kept] * np.sign(same), above, np.maximum(np.where(is_outside, more, -more), 0.0)]
+    found[:, mine] = np.where(beside, rows, np.nan)
     return found
 
 

@@ -11,6 +11,7 @@ import hashlib
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -25,7 +26,7 @@ from ..run.tasks import Context, version
 from ..standards import LAST_CLASS
 from ..tiles.grid import Key
 from ..tiles.store import SortedFile, append, files_of, fingerprint, kept_points
-from .frame import Cells, Course
+from .frame import Course
 from .settings import BELOW_M, Settings, Space
 
 SECTION_M = 100.0
@@ -86,15 +87,11 @@ def sweep(
     with disk.writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
     disk.sweep(folder)
-    space, unit_m = settings.space, request.zero.horizontal_unit_m
-    areas = [areas_along(one, _far_m(one, space)) / unit_m for one in courses]
-    touched = [[_touching(area, header.extent) for area in areas] for header in request.headers]
-    near = [number for number, own in enumerate(touched) if any(map(len, own))]
-    stations = b"".join(values.tobytes() for one in courses for values in one.by_station.values())
-    lines = hashlib.sha256(stations).hexdigest()
-    arguments = [(courses, space, lines, touched[number], folder) for number in near]
-    cloud = replace(request, headers=tuple(request.headers[number] for number in near))
-    found = read_each(cloud, sweep_file, arguments, runner, progress) if near else []
+    space = settings.space
+    areas = np.concatenate([_areas(one, space, request) for one in courses])
+    near = tuple(header for header in request.headers if len(_touching(areas, header.extent)))
+    arguments = [(courses, space, folder)] * len(near)
+    found = read_each(replace(request, headers=near), sweep_file, arguments, runner, progress) if near else []
     kept = sum(is_kept for _, _, is_kept in found)
     if kept:
         verb, whose = ("is", "its") if kept == 1 else ("are", "their")
@@ -115,11 +112,12 @@ def _far_m(course: Course, space: Space) -> float:
     return space.reach_m + space.high_m * float(np.abs(np.sin(course.roll)).max())
 
 
-def areas_along(course: Course, reach_m: float) -> np.ndarray:
-    """Return rectangles, (k, 4) metres, that hold all places within reach of a track."""
+def _areas(course: Course, space: Space, request: Request) -> np.ndarray:
+    """Return rectangles, (k, 4) in units of the CRS, that hold all points to store of a track."""
     parts = np.array_split(course.xyz[:, :2], max(int(course.length_m / AREA_M), 1))
     low, high = (np.array([reduce(part, axis=0) for part in parts]) for reduce in (np.min, np.max))
-    return np.column_stack([low - reach_m, high + reach_m])
+    far_m = _far_m(course, space)
+    return np.column_stack([low - far_m, high + far_m]) / request.zero.horizontal_unit_m
 
 
 def _touching(areas: np.ndarray, extent: Sequence[float]) -> np.ndarray:
@@ -129,64 +127,53 @@ def _touching(areas: np.ndarray, extent: Sequence[float]) -> np.ndarray:
 
 
 def sweep_file(
-    request: Request,
-    header: CloudHeader,
-    courses: Sequence[Course],
-    space: Space,
-    lines: str,
-    touched: Sequence[np.ndarray],
-    folder: Path,
-    context: Context,
+    request: Request, header: CloudHeader, courses: Sequence[Course], space: Space, folder: Path, context: Context
 ) -> tuple[SortedFile, dict, bool]:
-    """Sort the points of one file into sections, unless an earlier run has done so; a task.
-
-    Given are a digest of the tracks, and for each the rectangles that the file touches.
-    """
-
-    def sort(unfinished: Path) -> dict:
-        return _sort(request, header, courses, space, touched, unfinished, context.progress)
-
-    mine = folder / fingerprint(request, header, space, lines, version())
+    """Sort the points of a file into sections, unless an earlier run has done so; a task. See `_sort`."""
+    stations = b"".join(values.tobytes() for one in courses for values in one.by_station.values())
+    mine = folder / fingerprint(request, header, space, hashlib.sha256(stations).hexdigest(), version())
+    sort = partial(_sort, request, header, courses, space, context.progress)
     report, is_kept = kept_points(mine, header, sort, context.progress)
     counts = {(at, section): count for at, section, count in report["counts"]}
     return SortedFile(str(mine), counts), report, is_kept
 
 
 def _sort(
-    request: Request,
-    header: CloudHeader,
-    courses: Sequence[Course],
-    space: Space,
-    touched: Sequence[np.ndarray],
-    folder: Path,
-    progress: Progress,
+    request: Request, header: CloudHeader, courses: Sequence[Course], space: Space, progress: Progress, folder: Path
 ) -> dict:
-    """Write the points of a file to the files of their sections; returns the report, see `sweep`."""
-    cells = {at: Cells.around(courses[at], _far_m(courses[at], space)) for at, own in enumerate(touched) if len(own)}
-    seen = {at: np.zeros(len(courses[at].xyz), dtype=np.int64) for at in cells}
+    """Write the points of a file to the files of their sections; returns a report.
+
+    "counts" has the number of points by track and section, and "seen" by track and station; for the others see `Swept`.
+    """
+    own_areas = [_touching(_areas(one, space, request), header.extent) for one in courses]
+    touched = [at for at, areas in enumerate(own_areas) if len(areas)]
+    seen = {at: np.zeros(len(courses[at].xyz), dtype=np.int64) for at in touched}
     counts, heights = Counter[Key](), Counter[int]()
     checks: dict[str, int] = {}
     census = np.zeros(LAST_CLASS + 1, dtype=np.int64)
     wanted = [code for code in EVERY_CLASS if code not in space.left_out]
-    for xyz, codes, _, counted_now in read_classes(
-        header.path, wanted, progress, np.concatenate(touched), request.leave_out
+    for xyz, codes, _, read in read_classes(
+        header.path, wanted, progress, np.concatenate(own_areas), request.leave_out
     ):
-        census += counted_now
+        census += read
         kept = request.holds(xyz)
         local, codes = request.zero.to_local(xyz[kept]), codes[kept]
-        for at, own in cells.items():
+        for at in touched:
             progress.check()
-            near, station = own.find(local[:, :2])
+            near, station = courses[at].near(local[:, :2], _far_m(courses[at], space))
             seen[at] += np.bincount(station, minlength=len(seen[at]))
             above = local[near[::STRIDE], 2] - courses[at].xyz[station[::STRIDE], 2]
             heights.update(np.rint(above).astype(int).tolist())
             for section, points in _sorted(courses[at], station, space, local[near], codes[near]):
                 append(folder, (at, section), points, checks)
                 counts[at, section] += len(points)
-    sections = [(*key, count) for key, count in counts.items()]
-    rows = [(at, one, int(own[one])) for at, own in seen.items() for one in np.flatnonzero(own).tolist()]
-    found = {"counts": sections, "seen": rows, "heights": list(heights.items()), "census": census.tolist()}
-    return {"checks": checks, **found}
+    return {
+        "checks": checks,
+        "counts": [(*key, count) for key, count in counts.items()],
+        "seen": [(at, one, int(own[one])) for at, own in seen.items() for one in np.flatnonzero(own).tolist()],
+        "heights": list(heights.items()),
+        "census": census.tolist(),
+    }
 
 
 def _sorted(

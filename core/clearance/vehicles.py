@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .frame import Cells, Course
+from .frame import Course
 
 OWN_CELL_M, OWN_LENGTH_M, OWN_SHARE = 0.10, 50.0, 0.5
 """Cells across the track that are filled in more than this share of the metres of a section, and of such a length at
@@ -53,7 +53,7 @@ def spaces_of(place: np.ndarray, courses: Sequence[Course]) -> dict[int, np.ndar
     found = {own.track_id: _is_within(place[:, 1], place[:, 2], INNER_M)}
     xyz = own.places(*place.T)
     for other in others:
-        near, station = Cells.around(other, NEAR_M).find(xyz[:, :2])
+        near, station = other.near(xyz[:, :2], NEAR_M)
         _, v, w = other.located(xyz[near], station)
         found[other.track_id] = np.zeros(len(place), dtype=bool)
         found[other.track_id][near] = _is_within(v, w, BOX_ASIDE_M)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from ..clearance.profiles import COLUMNS, CUSTOM, NO_RULE, Profile, custom, named
+from ..clearance.profiles import COLUMNS, CUSTOM, NO_RULE, named
 from ..errors import ParameterError, RailExtractError
 from ..fields import INTRUSION_FIELDS, LENGTH
 from ..progress import Recording
@@ -13,9 +13,7 @@ from . import inputs, methods, outputs
 from .declaration import (
     CLOUD_NEEDS,
     CLOUD_WORDS,
-    LINE,
     POINT,
-    POLYGON,
     RAIL_WORDS,
     TABLE,
     TRACK_WORDS,
@@ -58,7 +56,9 @@ are on the ground or on what stands there."""
 
 def _check(values: Values) -> None:
     """Check the profile, the classes, the lines and the axis."""
-    profile = _profile(values)
+    from .clearance_inputs import read_profile
+
+    profile = read_profile(values)
     if values["WIDENING"] == "EBO" and profile.rule == NO_RULE:
         raise ParameterError(f"PROFILE {profile.name} has no rule for curves: leave WIDENING at NONE, or use MARGIN.")
     _left_out(values)
@@ -67,36 +67,6 @@ def _check(values: Values) -> None:
             values.source(name)
     if values.has_axis():
         values.axes(values.cloud_crs("POINTS"))
-
-
-def _profile(values: Values) -> Profile:
-    """Return the profile, which PROFILE_FILE states if PROFILE is CUSTOM."""
-    if values["PROFILE"] != CUSTOM:
-        return named()[values["PROFILE"]]
-    if not values.filled("PROFILE_FILE"):
-        raise ParameterError(
-            f"PROFILE is CUSTOM: name a file with the columns {' and '.join(COLUMNS)} in PROFILE_FILE."
-        )
-    return values.once("profile", lambda: _custom(values))
-
-
-def _custom(values: Values) -> Profile:
-    """Read the user's profile: a table, or a layer with a line or a polygon."""
-    source = values.source("PROFILE_FILE")
-    title = values.title("PROFILE_FILE")
-    name = title.replace("\\", "/").rpartition("/")[2] or "PROFILE_FILE"
-    if all(column in source.fields for column in COLUMNS):
-        try:
-            points = [(float(row[COLUMNS[0]]), float(row[COLUMNS[1]])) for _, row in source.rows()]
-        except (TypeError, ValueError) as error:
-            raise ParameterError(f"PROFILE_FILE {name} has a row without two numbers: correct or delete it.") from error
-        return custom(points, name)
-    drawn = [part for one in source.features(None) for kind, part in one.parts if kind in (LINE, POLYGON)]
-    if len(drawn) != 1:
-        raise ParameterError(
-            f"PROFILE_FILE {name} has neither the columns {' and '.join(COLUMNS)} nor one line or polygon: give one."
-        )
-    return custom([(float(v), float(w)) for v, w in drawn[0][:, :2]], name)
 
 
 def _left_out(values: Values) -> tuple[int, ...]:
@@ -112,10 +82,10 @@ def _run(values: Values, progress: Progress) -> Result:
     from ..clearance.sweep import EVERY_CLASS
     from ..report.clearance_remarks import remarks
     from ..report.clearance_slices import slices
-    from .clearance_inputs import read_courses
+    from .clearance_inputs import read_courses, read_profile
 
     progress = Recording(progress)
-    profile, request = _profile(values), values.request(EVERY_CLASS, progress, name="POINTS")
+    profile, request = read_profile(values), values.request(EVERY_CLASS, progress, name="POINTS")
     if profile.said:
         progress.warning(profile.said)
     if values.filled("PROFILE_FILE") and values["PROFILE"] != CUSTOM:

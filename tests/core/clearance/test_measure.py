@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 from rail_extract.core.clearance.measure import measure
 from rail_extract.core.clearance.platforms import nominal_mm
-from rail_extract.core.clearance.profiles import custom, named
+from rail_extract.core.clearance.profiles import named
 from rail_extract.core.clearance.settings import LEAVE_OUT, Settings
 from rail_extract.core.clouds.points import ask
 from rail_extract.core.errors import Cancelled
+from rail_extract.core.jobs.clearance_inputs import custom
 from rail_extract.core.progress import Progress
 from rail_extract.core.run.loop import Runner
 from rail_extract.core.tiles.store import counts_of

@@ -68,3 +68,10 @@ def test_more_cant_on_the_outer_track_needs_more_distance():
     side = neighbours([own, other], 0, SETTINGS)[0]
     assert side.least_m[50] == pytest.approx(4.0 + 3.53 / 1.50 * 0.05)
     assert neighbours([own, other], 1, SETTINGS)[1].least_m[50] == pytest.approx(4.0 + 3.53 / 1.50 * 0.05)
+
+
+def test_arcs_are_as_far_apart_as_their_radii_say_at_every_station():
+    inner, outer = course(arc(300.0)), course(arc(304.0), 2)
+    for own, other, side in ((inner, outer, 1), (outer, inner, 0)):
+        found = neighbours([own, other], 0, SETTINGS)[side].distance_m[2:-2]
+        assert found == pytest.approx(np.full(len(found), 4.0), abs=2.5e-4)

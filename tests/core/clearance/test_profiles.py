@@ -1,8 +1,9 @@
 """Profiles: those that ship, the user's, and what refuses them."""
 
 import pytest
-from rail_extract.core.clearance.profiles import REFERENCE, custom, mirrored, named
+from rail_extract.core.clearance.profiles import REFERENCE, mirrored, named
 from rail_extract.core.errors import ParameterError
+from rail_extract.core.jobs.clearance_inputs import custom
 
 HALF = [(1.0, 0.4), (1.2, 1.0), (1.0, 3.0), (0.0, 4.0)]
 

@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
-from rail_extract.core.clearance.outline import Outline
-from rail_extract.core.clearance.profiles import custom, named
+from rail_extract.core.clearance.profiles import named
+from rail_extract.core.clearance.settings import Outline
+from rail_extract.core.jobs.clearance_inputs import custom
 
 shapely = pytest.importorskip("shapely")
 
