@@ -74,8 +74,7 @@ def fit_track(
 ) -> Fit:
     """Fit the design elements of a track; warn where the fit does not hold.
 
-    The types of `fixed` elements are held, and the radii and ends that were edited. Raises ParameterError if the line
-    cannot have an alignment, or no part of the fit holds.
+    The types of `fixed` elements are held, and the radii and ends that were edited.
     """
     measured = measured_of(track, HOLDS * settings.tolerance_m, progress)
     in_plan, in_height, of_cant = progress.divide([4.0, 1.0, 1.0])

@@ -48,10 +48,7 @@ Paths = Union[str, Path, Sequence[Union[str, Path]]]
 
 
 def read_header(path: Path) -> CloudHeader:
-    """Read and check the header of one file, without its points.
-
-    Raises CloudError if the file has an unknown suffix, is damaged, is cut off or has no points.
-    """
+    """Read and check the header of one file, without its points."""
     with _reader(path) as las:
         return las.read_header(path)
 

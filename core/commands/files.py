@@ -20,10 +20,10 @@ from ..errors import CrsError, ParameterError, RailExtractError
 from ..files.rail_rasters import RasterSource, open_with_rasterio, write_rasters
 from ..jobs import declaration as kinds
 from ..jobs.clouds import Bounds, CloudSource
-from ..jobs.declaration import Job, Parameter
+from ..jobs.declaration import Parameter
 from ..jobs.outputs import WEB_PAGES
 from ..jobs.result import Result
-from ..jobs.values import Values
+from ..jobs.values import Job, Values
 from ..progress import Progress
 from ..run.loop import Runner
 from ..run.processes import workers

@@ -19,8 +19,8 @@ from pathlib import Path
 from typing import Any
 
 from ..jobs import CALLS, declaration
-from ..jobs.declaration import Job
 from ..jobs.result import Result
+from ..jobs.values import Job
 from ..progress import SILENT
 from .files import FileValues, run_with_files
 

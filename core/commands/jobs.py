@@ -15,8 +15,9 @@ from typing import Any
 
 from ..jobs import CALLS
 from ..jobs import declaration as kinds
-from ..jobs.declaration import Job, Parameter
+from ..jobs.declaration import Parameter
 from ..jobs.result import Result
+from ..jobs.values import Job
 from ..progress import Estimating, Progress
 from .files import FileValues, run_with_files
 

@@ -92,7 +92,6 @@ def within_plan(alignment: Alignment, where: str, progress: Progress, start_m: f
     """Return an alignment of which profile and cant end with its plan, after a check of all its numbers.
 
     The user is told where profile or cant and the plan do not cover each other, by stations from `start_m` at `s` = 0.
-    Raises DesignNumberError if an element, or the whole, is longer, steeper or farther away than anything on a railway.
     """
     checked(alignment.s_to - alignment.s_from, LENGTH, where[0].upper() + where[1:], "length")
     layouts: tuple[Sequence[Element], ...] = (alignment.plan, alignment.vertical, alignment.cant)

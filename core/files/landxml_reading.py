@@ -67,10 +67,7 @@ def read_landxml(path: Path, east_first: bool = False, progress: Progress = SILE
 
 
 def stated_system(path: Path) -> Optional[str]:
-    """Return the code of the coordinate system that a LandXML file states before its alignments, such as EPSG:25832.
-
-    Raises AlignmentFileError if the file is damaged or of another kind.
-    """
+    """Return the code of the coordinate system that a LandXML file states before its alignments, such as EPSG:25832."""
     _check_kind(path)
     first = next(branches(path, "LandXML", ("CoordinateSystem", "Alignments")), None)
     code = EPSG_CODE.fullmatch(first.get("epsgCode", "")) if first is not None else None

@@ -54,10 +54,7 @@ def check_table(names: Collection[str], source: str) -> None:
 
 
 def read_table(table: Iterable[Row], source: str) -> list[Row]:
-    """Return the rows of an element table with numbers for numbers that are written as text, after a check of all.
-
-    Raises DesignNumberError or ParameterError if a value is not one that an element can have.
-    """
+    """Return the rows of an element table with numbers for numbers that are written as text, after a check of all."""
     known = [one for one in ELEMENT_FIELDS if one.name not in UNREAD]
     return [{one.name: _read(row, one.name, one.kind, f"{_where(row)} of {source}") for one in known} for row in table]
 
@@ -104,7 +101,7 @@ def alignments(table: Iterable[Row], frame: LocalFrame, progress: Progress = SIL
     """Return the alignments of rows of `read_table`, in any order, in order of their track.
 
     Start, end, place and direction of the start, type and radii are read in plan; height and gradients, or cant, in the
-    other layouts. Raises ParameterError if a row lacks a value or states an impossible one, or a track has no plan.
+    other layouts.
     """
     tracks: dict[Optional[int], list[Row]] = {}
     for row in table:

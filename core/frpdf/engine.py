@@ -13,24 +13,20 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
-from importlib.util import find_spec
 from threading import local
 from typing import Any, Callable
 
 import numpy as np
 
-from ..errors import DeviceExhaustedError, ModelError
+from ..errors import DeviceExhaustedError
 from ..kernels import Library, one_thread, threads
 from ..progress import Progress
-from . import AUTO, START, STATISTICS
+from . import START, STATISTICS
 from .architecture import from_blocks, into_blocks
 from .corridor import MAX_PIECE_CELLS, Rectangle
 
 Array = Any
 """(channels, height, width) array of the library that computes."""
-
-_PACKAGES = {"TORCH": ("torch", "torch"), "OPENCV": ("cv2", "opencv-python-headless")}
-"""Module and package of each engine."""
 
 
 @dataclass(frozen=True)
@@ -206,39 +202,3 @@ def overlaps(windows: np.ndarray, reach: int) -> list[list[Overlap]]:
 
 def _slices(first: Sequence[int], last: Sequence[int]) -> tuple[slice, slice]:
     return slice(first[0], last[0]), slice(first[1], last[1])
-
-
-def make_engine(arrays: dict[str, np.ndarray], engine: str = AUTO, device: str = AUTO) -> Engine:
-    """Set up the engine that the user chose; with AUTO, PyTorch where it is installed and OpenCV elsewhere.
-
-    `engine` is AUTO, TORCH or OPENCV, `device` AUTO, CPU or CUDA. Raises ModelError if the engine's package or device
-    is not available, or the weights are not those of FRPDF.
-    """
-    if choose_engine(engine, device) == "TORCH":
-        try:
-            from .torch_engine import TorchEngine
-        except (ImportError, OSError) as error:  # Windows: a missing library, or one of another plugin with its name
-            if engine != AUTO or device == "CUDA" or not find_spec("cv2"):
-                raise ModelError(
-                    f"PyTorch is installed but does not start ({error}): set ENGINE to OPENCV, or reinstall PyTorch."
-                ) from error
-        else:
-            return TorchEngine(arrays, device)
-    from .opencv_engine import OpenCvEngine
-
-    return OpenCvEngine(arrays)
-
-
-def choose_engine(engine: str, device: str) -> str:
-    """Return the name of the engine to use, without importing it.
-
-    Raises ModelError if its package is not installed, or it cannot use the device.
-    """
-    if engine == AUTO:
-        engine = "TORCH" if find_spec("torch") else "OPENCV"
-    module, package = _PACKAGES[engine]
-    if not find_spec(module):
-        raise ModelError(f"ENGINE {engine} needs the package {package}: install it, or set ENGINE to AUTO.")
-    if engine == "OPENCV" and device == "CUDA":
-        raise ModelError("ENGINE OPENCV runs on the CPU only: set DEVICE to AUTO, or ENGINE to TORCH.")
-    return engine

@@ -25,10 +25,7 @@ class TorchEngine(Engine):
     library = pytorch()
 
     def __init__(self, arrays: dict[str, np.ndarray], device: str = "AUTO", exact: bool = False) -> None:
-        """Move the weights to the device, AUTO, CPU or CUDA; an `exact` engine computes in float32 on every device.
-
-        Raises ModelError if there is no CUDA device, or the weights are not those of FRPDF.
-        """
+        """Move the weights to the device, AUTO, CPU or CUDA; an `exact` engine computes in float32 on every device."""
         super().__init__()
         chosen = device_of(device)
         self._folded = fold(arrays)

@@ -19,12 +19,11 @@ from .declaration import (
     RAW_CLOUDS,
     TRACK_WORDS,
     Figure,
-    Job,
     LayerOutput,
     Number,
     Text,
 )
-from .values import class_numbers
+from .values import Job, class_numbers
 
 if TYPE_CHECKING:
     from ..airborne.survey import AirborneSurvey

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 from ..fields import CENTERLINES, RAILS
 from . import inputs, methods, outputs
-from .declaration import LINE_NEEDS, RAIL_WORDS, STEPS, TRACK_WORDS, Job, LayerInput
+from .declaration import LINE_NEEDS, RAIL_WORDS, STEPS, TRACK_WORDS, LayerInput
+from .values import Job
 
 if TYPE_CHECKING:
     from ..progress import Progress

@@ -9,7 +9,8 @@ from ..parameters import DEFAULT_GUIDE_DISTANCE_M, Parameters
 from ..progress import Estimating
 from ..standards import SEARCHED_CLASSES
 from . import inputs, methods, outputs
-from .declaration import CLOUD_NEEDS, CLOUD_WORDS, RAIL_WORDS, RAW_CLOUDS, Flag, Job, Number
+from .declaration import CLOUD_NEEDS, CLOUD_WORDS, RAIL_WORDS, RAW_CLOUDS, Flag, Number
+from .values import Job
 
 if TYPE_CHECKING:
     from ..clouds.points import Request

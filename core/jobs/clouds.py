@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Optional, TypeVar
@@ -58,34 +58,6 @@ def request_points(
     return replace(request, mask=source.mask, leave_out=source.leave_out)
 
 
-def read_points(
-    source: CloudSource,
-    class_codes: Sequence[int],
-    bounds: BoundsIn,
-    progress: Progress,
-) -> tuple[RailPoints, ...]:
-    """Read the points on the heads of the rail classes; `bounds` returns the extent, given the coordinate system."""
-    from ..clouds.on_heads import heads_of
-    from ..clouds.points import read_requested
-
-    found = read_requested(request_points(source, class_codes, bounds, progress), progress)
-    return tuple(heads_of(points) for points in found)
-
-
-def spool_points(
-    source: CloudSource,
-    class_codes: Sequence[int],
-    bounds: BoundsIn,
-    side_m: float,
-    folder: Path,
-    progress: Progress,
-) -> tuple[SpooledPoints, ...]:
-    """Sort the points of the rail classes into squares of `side_m` in `folder`, so that a cloud of any size fits."""
-    from ..tiles.store import spool
-
-    return spool(request_points(source, class_codes, bounds, progress), side_m, folder, progress)
-
-
 def crs_of(source: CloudSource) -> str | None:
     """Return the coordinate system of a cloud's first file as WKT; reading the points checks that all files agree."""
     from ..clouds.readers import first_header
@@ -123,35 +95,36 @@ class Area:
 
 
 def read_points_in(area: Area, cloud: CloudSource, progress: Progress) -> dict[int, RailPoints]:
-    """Read the points of an area, by class, all in one local frame.
+    """Read the points on the heads in an area, by class, all in one local frame; see `request_in`."""
+    from ..clouds.on_heads import heads_of
+    from ..clouds.points import read_requested
 
-    If the cloud or the area states no coordinate system, that of the other is used; if they differ, CrsError is raised.
-    Raises NoRailPointsError if the cloud has no points of one of the classes in the area.
-    """
-    return _all_of(area, cloud, lambda source, codes, bounds: read_points(source, codes, bounds, progress))
+    return _all_of(area, lambda: map(heads_of, read_requested(request_in(area, cloud, progress), progress)))
 
 
 def spool_points_in(
     area: Area, cloud: CloudSource, side_m: float, folder: Path, progress: Progress
 ) -> dict[int, SpooledPoints]:
     """Sort the points of an area into squares of `side_m` on disk, in `folder`, so that a cloud of any size fits."""
-    return _all_of(
-        area, cloud, lambda source, codes, bounds: spool_points(source, codes, bounds, side_m, folder, progress)
-    )
+    from ..tiles.store import spool
+
+    return _all_of(area, lambda: spool(request_in(area, cloud, progress), side_m, folder, progress))
 
 
-def _all_of(
-    area: Area, cloud: CloudSource, read: Callable[[CloudSource, Sequence[int], BoundsIn], Sequence[Points]]
-) -> dict[int, Points]:
-    """Read points with `read`, and check that there are some of each class."""
+def request_in(area: Area, cloud: CloudSource, progress: Progress) -> Request:
+    """Check which points of an area are to be read; raise CrsError if cloud and area have different systems.
+
+    If one of them states no coordinate system, that of the other is used.
+    """
     check_same_plane("POINTS", crs_of(cloud), f"the {area.what}", area.frame)
-
-    def bounds(_: str | None) -> Bounds:
-        return area.bounds
-
     source = replace(cloud, crs_wkt=cloud.crs_wkt or area.frame.crs_wkt)
+    return request_points(source, area.class_codes, lambda _: area.bounds, progress)
+
+
+def _all_of(area: Area, read: Callable[[], Iterable[Points]]) -> dict[int, Points]:
+    """Read points; raise NoRailPointsError if there is none of one of the classes."""
     try:
-        clouds = {points.class_code: points for points in read(source, area.class_codes, bounds)}
+        clouds = {points.class_code: points for points in read()}
     except NoRailPointsError:
         clouds = {}
     missing = [str(code) for code in area.class_codes if code not in clouds]

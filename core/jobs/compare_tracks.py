@@ -19,11 +19,11 @@ from .declaration import (
     TRACK_WORDS,
     Figure,
     Flag,
-    Job,
     LayerInput,
     LayerOutput,
     Number,
 )
+from .values import Job
 
 if TYPE_CHECKING:
     from ..comparison.tracks import Survey, TrackComparison

@@ -1,4 +1,4 @@
-"""What a job is: its parameters, outputs and figures, declared once for QGIS, the command line and Python.
+"""Parameters, outputs and figures of jobs, declared once for QGIS, the command line and Python.
 
 A module of this package declares a job and imports neither numpy nor anything that needs it, so that the toolbox opens
 before the packages are installed; what runs imports the rest.
@@ -6,17 +6,8 @@ before the packages are installed; what runs imports the rest.
 
 from __future__ import annotations
 
-import re
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
-
-from ..fields import Field
-
-if TYPE_CHECKING:
-    from ..progress import Progress
-    from .result import Result
-    from .values import Values
+from typing import Any
 
 NAME = r"(?<![\w./\\])[A-Z][A-Z_]+(?![\w/\\]|\.\w)"
 """A word in capitals that is not part of a path: in a message, the name of a parameter."""
@@ -224,70 +215,6 @@ ALIGNMENT = Group("alignment", "Alignment")
 RAW_CLOUDS = Group("rawclouds", "Raw clouds")
 STEPS = Group("singlesteps", "Single steps")
 SETUP = Group("setup", "Setup")
-
-
-def _run_elsewhere(values: Values, progress: Progress) -> Result:
-    """Stand for the run of a job that only the plugin can do."""
-    raise NotImplementedError
-
-
-@dataclass(frozen=True)
-class Job:
-    """What an algorithm does, takes and gives.
-
-    Attributes
-    ----------
-    name : str
-        Identifier for models and scripts of QGIS; it never changes.
-    label, summary, help : str
-        Name, one sentence, and paragraphs.
-    tags : tuple of str
-        Words by which a search finds it.
-    needs : tuple of tuple of str
-        Python modules that it needs: of each inner tuple one is enough, and the first is recommended.
-    parameters, outputs, figures : tuple
-        In the order of the interface.
-    fields : tuple of Field
-        Fields of the main result, for the help on the command line.
-    picture : str
-        File in the folder of pictures, for the help panel.
-    guide : str
-        Page of the guide that describes it.
-    pages : tuple of str
-        Pages of the guide to which the help links.
-    call : str
-        Name as a function of Python, and with hyphens as a command; empty for what sets up QGIS.
-    resumes : bool
-        Whether a folder can keep what a run has finished for later ones: the command then has the option ``--work``.
-    check : callable
-        Checks the values before a run, in the main thread; it raises a `RailExtractError`.
-    run : callable
-        Reads what the values name, and computes.
-    """
-
-    name: str
-    label: str
-    summary: str
-    help: str
-    tags: tuple[str, ...]
-    needs: tuple[tuple[str, ...], ...] = ()
-    parameters: tuple[Parameter, ...] = ()
-    outputs: tuple[Output, ...] = ()
-    figures: tuple[Figure, ...] = ()
-    group: Group = RAILS
-    fields: tuple[Field, ...] = ()
-    picture: str = ""
-    guide: str = "parameters"
-    pages: tuple[str, ...] = ("parameters",)
-    call: str = ""
-    resumes: bool = False
-    check: Callable[[Values], None] = lambda values: None
-    run: Callable[[Values, Progress], Result] = _run_elsewhere
-
-    def reworded(self, sentence: str, spell: Callable[[Parameter], str]) -> str:
-        """Return a sentence with other names for the parameters and outputs."""
-        named = {one.name: spell(one) for one in (*self.parameters, *self.outputs)}
-        return re.sub(NAME, lambda found: named.get(found[0], found[0]), sentence)
 
 
 # Search terms, also in the languages of the larger railways: the toolbox search compares whole words.

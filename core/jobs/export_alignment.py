@@ -15,9 +15,9 @@ from .declaration import (
     TABLE,
     Choice,
     FileOutput,
-    Job,
     LayerInput,
 )
+from .values import Job
 
 if TYPE_CHECKING:
     from ..progress import Progress
@@ -39,8 +39,8 @@ def _check(values: Values) -> None:
 def _run(values: Values, progress: Progress) -> Result:
     """Read the table, check it and write the file."""
     from ..files.design_files import check_designs, left_out, write_designs
-    from .lines import read_elements
     from .result import Result
+    from .track_inputs import read_elements
 
     reading, rest = progress.after_reading()
     checking, writing = rest.split(2)

@@ -11,7 +11,8 @@ from ..parameters import LEARNED, STRIPS, Parameters
 from ..progress import Estimating
 from ..standards import DEFAULT, SEARCHED_CLASSES
 from . import inputs, methods, outputs
-from .declaration import CLOUD_NEEDS, CLOUD_WORDS, RAIL_WORDS, TRACK_WORDS, Choice, Flag, Job, RasterOutput
+from .declaration import CLOUD_NEEDS, CLOUD_WORDS, RAIL_WORDS, TRACK_WORDS, Choice, Flag, RasterOutput
+from .values import Job
 
 if TYPE_CHECKING:
     from ..clouds.points import Request

@@ -8,14 +8,13 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..airborne.survey import GuideLine, gauge_of
 from ..clouds.crs import parse_crs, title_of, unit_in_plan
 from ..clouds.mask import Mask
-from ..design_places import check_line, check_places
+from ..design_places import are_places, check_line, check_places
 from ..errors import CrsError, MissingError, ParameterError, RailExtractError
 from ..kilometres.axes import (
     AHEAD,
@@ -27,21 +26,14 @@ from ..kilometres.axes import (
     PlacedAxes,
     Post,
     check_jumps,
+    first_post_field,
     km_of,
     make_axes,
-    post_field,
 )
 from ..kilometres.stationing import Jump
 from ..progress import Progress
 from .declaration import LINE, POINT, POLYGON
-from .inputs import DECREASING
-from .lines import LayerLines, Row, system_of, without_steps
-
-if TYPE_CHECKING:
-    from .values import Rows, Values
-
-
-from ..design_places import are_places
+from .lines import LayerLines, Row, Rows, system_of, without_steps
 
 FAR, NOWHERE = np.full(2, np.inf), np.full(2, np.nan)
 """Places of a feature that is not on any map, and of one without a geometry."""
@@ -111,10 +103,7 @@ class FeatureSource(ABC):
 
 
 def read_lines(source: FeatureSource, progress: Progress) -> LayerLines:
-    """Read all parts of all lines that have a length, in one local frame.
-
-    Raises RailExtractError if the lines are in degrees, there is none, or one has an impossible vertex.
-    """
+    """Read all parts of all lines that have a length, in one local frame."""
     system = system_of(source.crs_wkt, progress)
     parts = (
         (feature.number, feature.row, moving)
@@ -195,26 +184,34 @@ def read_mask(source: FeatureSource, crs_wkt: str | None) -> Mask:
     return Mask.of(rings)
 
 
-def read_axes(values: Values, crs_wkt: str | None) -> PlacedAxes:
-    """Read AXIS and what states its kilometres, in a projected coordinate system, or None for metres as they are.
+def read_axes(
+    axis: FeatureSource,
+    start: tuple[float, bool] | None,
+    posts: FeatureSource | None,
+    post_field: str | None,
+    jumps: FeatureSource | None,
+    notation: str,
+    crs_wkt: str | None,
+) -> PlacedAxes:
+    """Read an axis and what states its kilometres, in a projected coordinate system, or None for metres as they are.
 
-    Raises RailExtractError if a layer can't be transformed or lacks what it should state, or they contradict each
-    other.
+    `start` is the kilometre of the first vertex, and whether kilometres decrease from there. Raises RailExtractError if
+    a layer can't be transformed or lacks what it should state, or they contradict each other.
     """
-    axis, unit_m = values.source("AXIS"), unit_in_plan(crs_wkt)
+    unit_m = unit_in_plan(crs_wkt)
     lines = list(_axis_lines(axis, crs_wkt, unit_m))
     if not lines:
         raise MissingError(axis.name, "line")
-    start = None
-    if values.filled("START_KM"):
-        start = AxisStart(values["START_KM"], values["DIRECTION"] == DECREASING)
-    posts = _posts(values.source("POSTS"), values["POST_FIELD"], crs_wkt) if values.filled("POSTS") else []
-    jumps = _jumps(values.source("JUMPS")) if values.filled("JUMPS") else []
-    made = make_axes(lines, start, posts, jumps)
+    made = make_axes(
+        lines,
+        AxisStart(*start) if start else None,
+        _posts(posts, post_field, crs_wkt) if posts else [],
+        _jumps(jumps) if jumps else [],
+    )
     if axis.crs_wkt and crs_wkt and parse_crs(axis.crs_wkt) != parse_crs(crs_wkt):
         moved = f"AXIS is in {title_of(axis.crs_wkt)} and was transformed to {title_of(crs_wkt)}."
         made = Axes(made.axes, (moved, *made.notices))
-    return PlacedAxes(made, unit_m, values["FORMAT"])
+    return PlacedAxes(made, unit_m, notation)
 
 
 def _placed(source: FeatureSource, crs_wkt: str | None) -> list[Feature]:
@@ -269,7 +266,7 @@ def _axis_lines(source: FeatureSource, crs_wkt: str | None, unit_m: float) -> It
 
 def _posts(source: FeatureSource, field: str | None, crs_wkt: str | None) -> list[Post]:
     """Read the posts."""
-    name = field or post_field(source.fields)
+    name = field or first_post_field(source.fields)
     if name not in source.fields:
         raise ParameterError(f"POSTS has no field {name}: it has {', '.join(source.fields)}.")
     found = [

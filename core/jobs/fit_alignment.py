@@ -19,10 +19,10 @@ from .declaration import (
     Choice,
     Figure,
     Flag,
-    Job,
     LayerInput,
     Number,
 )
+from .values import Job
 
 if TYPE_CHECKING:
     from ..alignment.fit import Fit
@@ -49,8 +49,8 @@ def _run(values: Values, progress: Progress) -> Result:
     from ..files.layers import elements_layer, stations_layer
     from ..progress import Recording
     from ..report import build_alignment_page
-    from .lines import read_elements, read_tracks
     from .result import Result
+    from .track_inputs import read_elements, read_tracks
 
     progress = Recording(progress)
     reading, fitting = progress.after_reading()

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 from ..errors import RasterError
 from ..frpdf.models import MODELS, Model, choose
 from . import inputs, methods, outputs
-from .declaration import RAIL_WORDS, STEPS, Job, RasterOutput
+from .declaration import RAIL_WORDS, STEPS, RasterOutput
+from .values import Job
 
 if TYPE_CHECKING:
     from ..files.rail_rasters import RasterHeader
@@ -57,8 +58,7 @@ def model_for(header: RasterHeader, standard: RailStandard, name: str) -> Model:
 
 def _run(values: Values, progress: Progress) -> Result:
     """Clean each band."""
-    from ..frpdf.cleanup import clean
-    from ..frpdf.engine import make_engine
+    from ..frpdf.cleanup import clean, make_engine
     from ..frpdf.weights import load_arrays
     from .result import Result
 

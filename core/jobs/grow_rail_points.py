@@ -18,12 +18,12 @@ from .declaration import (
     RAIL_WORDS,
     RAW_CLOUDS,
     Flag,
-    Job,
     LayerOutput,
     Number,
     Parameter,
     Place,
 )
+from .values import Job
 
 if TYPE_CHECKING:
     from ..progress import Progress

@@ -16,10 +16,10 @@ from .declaration import (
     RAIL_WORDS,
     FileInput,
     Flag,
-    Job,
     LayerInput,
     LayerOutput,
 )
+from .values import Job
 
 if TYPE_CHECKING:
     from ..alignment.elements import Alignment
@@ -95,7 +95,7 @@ def _compared(
     """Return the deviations of each track with the alignment beside it; none without tracks."""
     from ..alignment.measured import compared_with
     from .clouds import check_same_plane
-    from .lines import read_tracks
+    from .track_inputs import read_tracks
 
     if not values.filled("TRACKS"):
         return []

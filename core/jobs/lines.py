@@ -11,23 +11,23 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from ..alignment.elements import Alignment
-from ..alignment.measured import Track, cant_of_rails, stations_by_track, with_cant
 from ..clouds.crs import MAX_COORDINATE, is_geographic, name_of, parse_crs, units, warn_of_scale
 from ..comparison.tracks import SurveyedLine
 from ..design_places import has_stray
 from ..errors import CrsError, MissingError, RailExtractError
 from ..fields import CENTERLINE_FIELDS, RAIL_FIELDS, Field
-from ..files.table import alignments, check_table, frame_of, read_table
 from ..frame import ORIGIN_STEP, LocalFrame
 from ..polyline import Polyline, project
-from ..progress import SILENT, Progress
+from ..progress import Progress
 from ..rails import NO_GAPS, SAME_SUM_M, Centerline, RailLine
 from ..standards import SPACING_RANGE_M
 from .clouds import check_same_plane
-from .values import Values
 
 Row = Mapping[str, Any]
+
+Rows = tuple[Sequence[Row], Sequence[str]]
+"""Values of the features of a layer by the name of the field, None where one is empty; and the names of all fields."""
+
 Made = TypeVar("Made")
 
 MAX_WHOLE, ID = 2**31 - 1, re.compile(r"\s*\d{1,10}\s*")
@@ -235,33 +235,3 @@ def way(name: str, own: LocalFrame, other_name: str, frame: LocalFrame) -> np.nd
     check_same_plane(name, own.crs_wkt, other_name, frame)
     check_same_plane(other_name, frame.crs_wkt, name, own)
     return own.shift_to(frame)
-
-
-def read_tracks(values: Values, name: str, progress: Progress) -> tuple[list[Track], LocalFrame]:
-    """Read centerlines with their cant: from QUALITY, else from RAILS.
-
-    Raises RailExtractError if a layer has no lines, lacks a field, or states the cant of other tracks.
-    """
-    read = values.lines(name, progress)
-    lines, frame = [(line.track_id, line.xyz) for line in read.centerlines()], read.frame
-    if values.filled("QUALITY"):
-        return with_cant(lines, stations_by_track(*values.rows("QUALITY", SILENT), "QUALITY"), "QUALITY", name), frame
-    shapes = []
-    if values.filled("RAILS"):
-        rails = values.lines("RAILS", progress)
-        shift = way("RAILS", rails.frame, name, frame)
-        shapes = [xyz + shift for _, _, xyz in rails.parts]
-    none = [np.zeros(len(xyz), dtype=bool) for _, xyz in lines]
-    return [Track(one, xyz, cant_of_rails(xyz, shapes), own) for (one, xyz), own in zip(lines, none)], frame
-
-
-def read_elements(values: Values, name: str, crs_wkt: str | None, progress: Progress = SILENT) -> list[Alignment]:
-    """Read the alignments of an element table; its geometries are not used.
-
-    `crs_wkt` is the coordinate system of a table that has none. Raises RailExtractError if the table is in degrees or
-    not an element table, or an element is wrong.
-    """
-    table, fields = values.rows(name, progress)
-    check_table(fields, name)
-    rows = read_table(table, name)
-    return alignments(rows, frame_of(rows, system_of(values.system(name) or crs_wkt, progress), name), progress)

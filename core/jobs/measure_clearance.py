@@ -19,13 +19,12 @@ from .declaration import (
     TRACK_WORDS,
     Choice,
     Figure,
-    Job,
     LayerInput,
     LayerOutput,
     Number,
     Text,
 )
-from .values import class_numbers
+from .values import Job, class_numbers
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

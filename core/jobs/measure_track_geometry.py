@@ -12,7 +12,8 @@ from ..parameters import Parameters
 from ..progress import Recording
 from ..standards import CUSTOM, RailStandard, resolve
 from . import inputs, methods, outputs
-from .declaration import CLOUD_NEEDS, RAIL_WORDS, TRACK_WORDS, Job, LayerInput
+from .declaration import CLOUD_NEEDS, RAIL_WORDS, TRACK_WORDS, LayerInput
+from .values import Job
 
 if TYPE_CHECKING:
     from ..progress import Progress

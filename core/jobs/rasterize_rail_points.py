@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 from ..frpdf.models import choose
 from . import inputs
-from .declaration import CLOUD_WORDS, RAIL_WORDS, STEPS, Job, RasterOutput
+from .declaration import CLOUD_WORDS, RAIL_WORDS, STEPS, RasterOutput
+from .values import Job
 
 if TYPE_CHECKING:
     from ..progress import Progress
@@ -23,17 +24,19 @@ def _check(values: Values) -> None:
 def _run(values: Values, progress: Progress) -> Result:
     """Rasterize each class."""
     from ..checks.points import plausible
+    from ..clouds.on_heads import heads_of
+    from ..clouds.points import read_requested
     from ..files.rail_rasters import header_for
     from ..raster import cell_size, rasterize
     from ..tiles.grid import MemorySource
-    from .clouds import read_points
     from .result import Result
     from .track_inputs import SQUARE_M
 
     standard = values.standard()
-    clouds = read_points(values.cloud(), values.class_codes(), values.extent, progress)
+    request = values.request(values.class_codes(), progress)
+    clouds = [heads_of(points) for points in read_requested(request, progress)]
     dense = {source.class_code for source in plausible([MemorySource(one, SQUARE_M) for one in clouds], progress)}
-    clouds = tuple(points for points in clouds if points.class_code in dense)
+    clouds = [points for points in clouds if points.class_code in dense]
     cell_m = cell_size(standard.gauge_m, standard.head_width_m)
     rasters = [rasterize(points.xyz, cell_m) for points in clouds]
     frame, codes = clouds[0].frame, [points.class_code for points in clouds]

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 from ..errors import CrsError, RailExtractError
 from ..fields import EXTENT_FIELDS, STATION_FIELDS
 from . import inputs
-from .declaration import ALIGNMENT, LINE_NEEDS, PLACES, RAIL_WORDS, Figure, Job, LayerInput, LayerOutput
+from .declaration import ALIGNMENT, LINE_NEEDS, PLACES, RAIL_WORDS, Figure, LayerInput, LayerOutput
+from .values import Job
 
 if TYPE_CHECKING:
     import numpy as np

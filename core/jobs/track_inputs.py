@@ -1,4 +1,4 @@
-"""The inputs of Measure Track Geometry: centerlines, rails and their points, in one local frame."""
+"""Tracks that jobs read: centerlines and rails with their points, tracks with their cant, and designs."""
 
 from __future__ import annotations
 
@@ -8,14 +8,17 @@ from pathlib import Path
 
 import numpy as np
 
+from ..alignment.elements import Alignment
+from ..alignment.measured import Track, cant_of_rails, stations_by_track, with_cant
 from ..errors import RailExtractError
+from ..files.table import alignments, check_table, frame_of, read_table
 from ..frame import LocalFrame
-from ..progress import Progress
+from ..progress import SILENT, Progress
 from ..rails import Centerline, RailLine, TrackGeometry
 from ..standards import RAIL_CLASS
 from ..tiles.store import SpooledPoints
 from .clouds import Area, Bounds, spool_points_in
-from .lines import way
+from .lines import system_of, way
 from .values import Values
 
 MARGIN_M = 1.0
@@ -39,11 +42,7 @@ class TrackInputs:
 
 
 def read_inputs(values: Values, folder: Path, progress: Progress) -> TrackInputs:
-    """Read INPUT and RAILS, and sort the points of POINTS around the rails into squares in a folder.
-
-    Raises RailExtractError if the coordinate systems differ or are in degrees, the cloud has no points of a rail's
-    class in the area, or a layer has no line.
-    """
+    """Read INPUT and RAILS, and sort the points of POINTS around the rails into squares in a folder."""
     centerlines, rails = values.lines("INPUT", progress.span(0.0, 0.1)), values.lines("RAILS", progress.span(0.1, 0.2))
     tracks, lines, frame = centerlines.centerlines(), rails.rails(progress, RAIL_CLASS), centerlines.frame
     shift = way("RAILS", rails.frame, "INPUT", frame)
@@ -106,3 +105,29 @@ def _bounds(rails: Sequence[RailLine], frame: LocalFrame) -> Bounds:
         np.array([xyz.min(axis=0) - MARGIN_M, xyz.max(axis=0) + MARGIN_M])
     ).tolist()
     return west, south, east, north
+
+
+def read_tracks(values: Values, name: str, progress: Progress) -> tuple[list[Track], LocalFrame]:
+    """Read centerlines with their cant: from QUALITY, else from RAILS."""
+    read = values.lines(name, progress)
+    lines, frame = [(line.track_id, line.xyz) for line in read.centerlines()], read.frame
+    if values.filled("QUALITY"):
+        return with_cant(lines, stations_by_track(*values.rows("QUALITY", SILENT), "QUALITY"), "QUALITY", name), frame
+    shapes = []
+    if values.filled("RAILS"):
+        rails = values.lines("RAILS", progress)
+        shift = way("RAILS", rails.frame, name, frame)
+        shapes = [xyz + shift for _, _, xyz in rails.parts]
+    none = [np.zeros(len(xyz), dtype=bool) for _, xyz in lines]
+    return [Track(one, xyz, cant_of_rails(xyz, shapes), own) for (one, xyz), own in zip(lines, none)], frame
+
+
+def read_elements(values: Values, name: str, crs_wkt: str | None, progress: Progress = SILENT) -> list[Alignment]:
+    """Read the alignments of an element table; its geometries are not used.
+
+    `crs_wkt` is the coordinate system of a table that has none.
+    """
+    table, fields = values.rows(name, progress)
+    check_table(fields, name)
+    rows = read_table(table, name)
+    return alignments(rows, frame_of(rows, system_of(values.system(name) or crs_wkt, progress), name), progress)

@@ -9,7 +9,8 @@ from ..parameters import DEFAULT_EPOCHS
 from ..progress import Estimating, Until
 from ..standards import SEARCHED_CLASSES
 from . import inputs, methods, outputs
-from .declaration import CLOUD_NEEDS, CLOUD_WORDS, RAIL_WORDS, RAW_CLOUDS, Figure, FileInput, FileOutput, Job, Number
+from .declaration import CLOUD_NEEDS, CLOUD_WORDS, RAIL_WORDS, RAW_CLOUDS, Figure, FileInput, FileOutput, Number
+from .values import Job
 
 if TYPE_CHECKING:
     from ..learned.blocks import Plan

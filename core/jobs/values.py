@@ -6,12 +6,13 @@ import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..disk import Destination
 from ..errors import ParameterError
+from ..fields import Field
 from ..parameters import AirborneParameters, GrowParameters, Parameters
 from ..standards import (
     CUSTOM,
@@ -25,7 +26,8 @@ from ..standards import (
     resolve,
 )
 from .clouds import Bounds, CloudSource, checked_crs, request_points
-from .declaration import Job
+from .declaration import NAME, RAILS, Figure, Group, Output, Parameter
+from .inputs import DECREASING
 
 if TYPE_CHECKING:
     import numpy as np
@@ -37,7 +39,8 @@ if TYPE_CHECKING:
     from ..progress import Progress
     from ..run.loop import Runner
     from .features import FeatureSource, PlacedFeatures
-    from .lines import LayerLines
+    from .lines import LayerLines, Rows
+    from .result import Result
 
 NUMBERS = {
     "SMOOTHING_XY": "smoothing_xy_m",
@@ -72,8 +75,69 @@ GROWTH = {
 AIRBORNE = {"REACH": "reach_m", "FOOTPRINT": "footprint_m", "RAIL_HEIGHT": "rail_height_m"}
 """The same for `AirborneParameters`."""
 
-Rows = tuple[Sequence[Mapping[str, Any]], Sequence[str]]
-"""Values of the features of a layer by the name of the field, None where one is empty; and the names of all fields."""
+
+def _run_elsewhere(values: Values, progress: Progress) -> Result:
+    """Stand for the run of a job that only the plugin can do."""
+    raise NotImplementedError
+
+
+@dataclass(frozen=True)
+class Job:
+    """What an algorithm does, takes and gives.
+
+    Attributes
+    ----------
+    name : str
+        Identifier for models and scripts of QGIS; it never changes.
+    label, summary, help : str
+        Name, one sentence, and paragraphs.
+    tags : tuple of str
+        Words by which a search finds it.
+    needs : tuple of tuple of str
+        Python modules that it needs: of each inner tuple one is enough, and the first is recommended.
+    parameters, outputs, figures : tuple
+        In the order of the interface.
+    fields : tuple of Field
+        Fields of the main result, for the help on the command line.
+    picture : str
+        File in the folder of pictures, for the help panel.
+    guide : str
+        Page of the guide that describes it.
+    pages : tuple of str
+        Pages of the guide to which the help links.
+    call : str
+        Name as a function of Python, and with hyphens as a command; empty for what sets up QGIS.
+    resumes : bool
+        Whether a folder can keep what a run has finished for later ones: the command then has the option ``--work``.
+    check : callable
+        Checks the values before a run, in the main thread; it raises a `RailExtractError`.
+    run : callable
+        Reads what the values name, and computes.
+    """
+
+    name: str
+    label: str
+    summary: str
+    help: str
+    tags: tuple[str, ...]
+    needs: tuple[tuple[str, ...], ...] = ()
+    parameters: tuple[Parameter, ...] = ()
+    outputs: tuple[Output, ...] = ()
+    figures: tuple[Figure, ...] = ()
+    group: Group = RAILS
+    fields: tuple[Field, ...] = ()
+    picture: str = ""
+    guide: str = "parameters"
+    pages: tuple[str, ...] = ("parameters",)
+    call: str = ""
+    resumes: bool = False
+    check: Callable[[Values], None] = lambda values: None
+    run: Callable[[Values, Progress], Result] = _run_elsewhere
+
+    def reworded(self, sentence: str, spell: Callable[[Parameter], str]) -> str:
+        """Return a sentence with other names for the parameters and outputs."""
+        named = {one.name: spell(one) for one in (*self.parameters, *self.outputs)}
+        return re.sub(NAME, lambda found: named.get(found[0], found[0]), sentence)
 
 
 class Values(ABC):
@@ -168,9 +232,14 @@ class Values(ABC):
 
     def axes(self, crs_wkt: str | None) -> PlacedAxes:
         """Read AXIS and what states its kilometres; see `read_axes`."""
+        return self.once("axes", lambda: self._axes(crs_wkt))
+
+    def _axes(self, crs_wkt: str | None) -> PlacedAxes:
         from .features import read_axes
 
-        return self.once("axes", lambda: read_axes(self, crs_wkt))
+        start = (self["START_KM"], self["DIRECTION"] == DECREASING) if self.filled("START_KM") else None
+        posts, jumps = (self.source(name) if self.filled(name) else None for name in ("POSTS", "JUMPS"))
+        return read_axes(self.source("AXIS"), start, posts, self["POST_FIELD"], jumps, self["FORMAT"], crs_wkt)
 
     def places(self, name: str, plane: str | None, progress: Progress) -> PlacedFeatures:
         """Read the features of a layer of any kind, in the plane of the axes; see `places_of`."""
@@ -249,7 +318,7 @@ class Values(ABC):
 
     def engine(self) -> str:
         """Read ENGINE, and check that it is installed and runs on DEVICE."""
-        from ..frpdf.engine import choose_engine
+        from ..frpdf.cleanup import choose_engine
 
         return choose_engine(self["ENGINE"], self["DEVICE"])
 

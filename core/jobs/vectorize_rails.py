@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 from ..fields import RAILS
 from . import inputs, methods, outputs
-from .declaration import CLOUD_NEEDS, CLOUD_WORDS, RAIL_WORDS, STEPS, Job
+from .declaration import CLOUD_NEEDS, CLOUD_WORDS, RAIL_WORDS, STEPS
+from .values import Job
 
 if TYPE_CHECKING:
     from ..frame import LocalFrame

@@ -290,7 +290,7 @@ class PlacedAxes:
         return locate(self.axes.axes, xy * self.unit_m, self.notation, progress)
 
 
-def post_field(names: Collection[str]) -> str:
+def first_post_field(names: Collection[str]) -> str:
     """Return the field of a post layer with the kilometre; raise RailExtractError if it has none of the usual ones."""
     found = next((one for one in KM_FIELDS if one in names), "")
     if not found:

@@ -96,7 +96,7 @@ def stationing_of(length_m: float, s: Sequence[float], km: Sequence[float], jump
     Between two of them, kilometres are interpolated, and beyond them they continue at true length. Where the axis is
     longer or shorter than the numbers by more than `JUMP_M` and no jump is stated, the numbers count on at true length
     up to the next place and jump there, as posts are numbered. `jumps` are in the order of increasing kilometres of the
-    line. Raises RailExtractError if kilometres decrease without a jump, or a jump is not on the axis.
+    line.
     """
     knots = _Knots(list(jumps))
     knots.before(s[0], km[0])

@@ -123,8 +123,7 @@ def classify_files(
     """Find the rail points of a cloud, in `standards.SEARCHED_CLASSES`, and write its files with their classes.
 
     `output` is from `plan_output`, for the files of the request. The caller removes the folder, which gets 42 bytes per
-    point. Results of the runner are complete, or there is no output. Raises DiskError also if another program has
-    changed an output, and RailExtractError if a square could not be searched.
+    point. Results of the runner are complete, or there is no output.
     """
     finding, rewriting = progress.divide((2.0, 1.0))
     labels = Labels(request, folder)

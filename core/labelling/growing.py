@@ -53,8 +53,7 @@ def grow_files(
 
     Seeds, (k, 2) in units of the CRS, are places on railheads, k = 1, or lines along them; the request has
     `standards.SEARCHED_CLASSES`. `output` is from `files.plan_output`, for the files of the request. The caller removes
-    the folder, which gets 36 bytes per point within reach. Raises OffCloudError or OffRailError if no seed is in the
-    cloud, or on a rail.
+    the folder, which gets 36 bytes per point within reach.
     """
     growing, rewriting = progress.divide((7.0, 3.0))
     labels = Labels(request, folder)

@@ -60,8 +60,7 @@ def train_classifier(
     """Train a classifier on a labelled cloud and write its weights; continue if such a training was interrupted.
 
     The request has the files, `standards.SEARCHED_CLASSES` and the extent. The folder `folder_of` the weights, an .npz
-    file, is removed once they are written. Raises NoRailPointsError or ParameterError if nothing can be learned from
-    the labels, or the folder holds another training.
+    file, is removed once they are written.
     """
     from ..learned.training import TrainingSettings, train
 

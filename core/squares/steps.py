@@ -12,8 +12,8 @@ from ..classify.thin import SURROUNDINGS_M, drawn
 from ..clouds.points import RailPoints
 from ..errors import ParameterError
 from ..frame import LocalFrame
-from ..frpdf.cleanup import MARGIN, clean, max_passes
-from ..frpdf.engine import Engine, make_engine
+from ..frpdf.cleanup import MARGIN, clean, make_engine, max_passes
+from ..frpdf.engine import Engine
 from ..frpdf.models import choose
 from ..frpdf.weights import load_arrays
 from ..heads.elevation import ElevationParameters, elevate, flat_rail, flat_rails, numbered

@@ -254,8 +254,7 @@ def build_centerlines(
     """Draw the centerlines of all tracks of one gauge, numbered from 1 in order of their starts from west to east.
 
     The result refers to the rails by their ids; rails without heights give centerlines without heights. Rails closer to
-    `other_spacings_m`, the distances of the rails of other gauges, are left to these. Raises NoTrackError if rails are
-    parallel, but at another spacing.
+    `other_spacings_m`, the distances of the rails of other gauges, are left to these.
     """
     rails = _in_order(rails)
     pairs = pair_rails(rails, parameters, other_spacings_m, progress.span(0.0, 0.5))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ...core.jobs import JOBS
-from ...core.jobs.declaration import Job
+from ...core.jobs.values import Job
 from .base import JobAlgorithm, RailAlgorithm
 from .check_installation import CheckInstallation
 from .install_packages import InstallPackages

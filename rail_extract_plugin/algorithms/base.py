@@ -22,7 +22,8 @@ from qgis.PyQt.QtGui import QIcon
 from qgis.PyQt.QtWidgets import QWidget
 
 from ...core.disk import Destination
-from ...core.jobs.declaration import RAILS, STEPS, Job
+from ...core.jobs.declaration import RAILS, STEPS
+from ...core.jobs.values import Job
 from ...core.kernels import blas, one_thread
 from ...core.progress import Progress
 from ..dialog.checks import check_values, explain_invalid

@@ -11,8 +11,9 @@ from qgis.core import Qgis
 
 from ...core.errors import RailExtractError
 from ...core.jobs import extract_rails
-from ...core.jobs.declaration import SETUP, Figure, Job
+from ...core.jobs.declaration import SETUP, Figure
 from ...core.jobs.outputs import REPORT
+from ...core.jobs.values import Job
 from ...core.progress import Progress
 from ..dialog.parameter_values import ParameterValues
 from ..setup.dependencies import missing_packages

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from ...core.errors import Cancelled, ParameterError, RailExtractError
-from ...core.jobs import declaration
 from ...core.jobs.declaration import SETUP, Choice, Figure
+from ...core.jobs.values import Job as Declared
 from ...core.progress import Progress
 from ..dialog.parameter_values import ParameterValues
 from ..notices import notices
@@ -23,7 +23,7 @@ BUILDS = {
 """Options for pip where the default index has no such build of PyTorch for a system."""
 
 
-JOB = declaration.Job(
+JOB = Declared(
     INSTALL,
     "Install packages",
     "Installs the Python packages that Rail Extract needs and this QGIS lacks.",

@@ -32,7 +32,8 @@ from qgis.core import (
 )
 
 from ...core.jobs import declaration as kinds
-from ...core.jobs.declaration import Figure, Job, Parameter
+from ...core.jobs.declaration import Figure, Parameter
+from ...core.jobs.values import Job
 from .cloud_parameter import CloudParameter
 
 Definitions = tuple[Union[QgsProcessingParameterDefinition, QgsProcessingOutputDefinition], ...]

@@ -23,8 +23,7 @@ from ...core.disk import Destination
 from ...core.errors import ParameterError, RailExtractError, RasterError
 from ...core.jobs import declaration as kinds
 from ...core.jobs.clouds import Bounds, CloudSource, checked_crs
-from ...core.jobs.declaration import Job
-from ...core.jobs.values import Values
+from ...core.jobs.values import Job, Values
 from ...core.progress import SILENT
 from ..reading.clouds import cloud_source, points_folder
 from ..setup.interpreter import known_interpreter

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from qgis.core import QgsApplication, QgsProcessingParameterDefinition
 
+from ...core.jobs.declaration import NAME
 from .choices import WORDS
 from .passwords import masked
 
@@ -14,10 +15,6 @@ Definitions = Sequence[QgsProcessingParameterDefinition]
 
 WITH_DIALOGS = "desktop"
 """QGIS's name for the platform with windows."""
-
-NAME = r"(?<![\w./\\])[A-Z][A-Z_]+(?![\w/\\]|\.\w)"
-"""A word in capitals that is not part of a path."""
-
 
 OVERLONG, SHOWN = r"\S{500,}", 100
 """A word longer than the name of any file, and how many of its characters are shown: a window grows with its text."""

@@ -6,8 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from rail_extract.__main__ import _run
-from rail_extract.core.frpdf.cleanup import clean
-from rail_extract.core.frpdf.engine import make_engine
+from rail_extract.core.frpdf.cleanup import clean, make_engine
 from rail_extract.core.frpdf.models import MODELS
 from rail_extract.core.frpdf.weights import load_arrays
 from rail_extract.core.kernels import ENVIRONMENT, Library, _beside, _openblas, blas, cores, one_thread, threads

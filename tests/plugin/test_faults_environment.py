@@ -23,7 +23,7 @@ from qgis.core import (
 from rail_extract.core import pipeline
 from rail_extract.core.disk import Destination
 from rail_extract.core.errors import RailExtractError
-from rail_extract.core.frpdf import engine, models
+from rail_extract.core.frpdf import cleanup, models
 from rail_extract.core.run import processes, worker
 from rail_extract.rail_extract_plugin.algorithms import base
 from rail_extract.rail_extract_plugin.dialog import parameter_values
@@ -43,7 +43,7 @@ def without(*modules):
 
     def prepare(bench):
         find_spec = dependencies.find_spec
-        for module in (dependencies, engine):
+        for module in (dependencies, cleanup):
             bench.patch.setattr(module, "find_spec", lambda name: None if name in modules else find_spec(name))
         return cloud(bench)
 

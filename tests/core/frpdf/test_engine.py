@@ -12,9 +12,9 @@ from rail_extract.core.clouds.points import RailPoints, read_rail_points
 from rail_extract.core.errors import Cancelled, ModelError
 from rail_extract.core.frpdf import cleanup
 from rail_extract.core.frpdf import engine as engine_module
-from rail_extract.core.frpdf.cleanup import clean
+from rail_extract.core.frpdf.cleanup import clean, make_engine
 from rail_extract.core.frpdf.corridor import Rectangle, lay_batches
-from rail_extract.core.frpdf.engine import MAX_PIECE_CELLS, Engine, Step, make_engine
+from rail_extract.core.frpdf.engine import MAX_PIECE_CELLS, Engine, Step
 from rail_extract.core.frpdf.models import MODELS
 from rail_extract.core.frpdf.weights import load_arrays
 from rail_extract.core.pipeline import Parameters
@@ -36,7 +36,7 @@ END_M = 0.5
 
 @pytest.fixture
 def without_torch(monkeypatch):
-    monkeypatch.setattr(engine_module, "find_spec", lambda name: None if name == "torch" else find_spec(name))
+    monkeypatch.setattr(cleanup, "find_spec", lambda name: None if name == "torch" else find_spec(name))
 
 
 def test_opencv_runs_where_pytorch_is_not_installed(random_arrays, without_torch):
@@ -55,7 +55,7 @@ def test_pytorch_runs_where_it_is_installed(random_arrays):
 
 def test_opencv_replaces_a_pytorch_that_does_not_start(random_arrays, monkeypatch):
     found = find_spec("cv2")
-    monkeypatch.setattr(engine_module, "find_spec", lambda name: found)  # as if installed
+    monkeypatch.setattr(cleanup, "find_spec", lambda name: found)  # as if installed
     monkeypatch.setitem(sys.modules, "rail_extract.core.frpdf.torch_engine", None)  # its import fails
     assert make_engine(random_arrays).description.startswith("OpenCV")
     for asked in (("TORCH", "AUTO"), ("AUTO", "CUDA")):

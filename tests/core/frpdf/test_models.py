@@ -6,8 +6,7 @@ import zipfile
 import numpy as np
 import pytest
 from rail_extract.core.errors import ModelError
-from rail_extract.core.frpdf.cleanup import clean
-from rail_extract.core.frpdf.engine import make_engine
+from rail_extract.core.frpdf.cleanup import clean, make_engine
 from rail_extract.core.frpdf.models import AUTOMATIC, MODELS, choose
 from rail_extract.core.frpdf.weights import MAX_BYTES, load_arrays, save_arrays
 from rail_extract.core.raster import RailRaster
