@@ -27,8 +27,8 @@ from unittest.mock import patch
 import numpy as np
 from golden import TABLE
 from processes import processes
-from rail_extract.core import pipeline
 from rail_extract.core.classify.flush import NO_LINES, Flush
+from rail_extract.core.pipeline import drawing
 from rail_extract.core.polyline import Polyline
 from rail_extract.laboratory.ruler.golden import (
     PLACES,
@@ -241,7 +241,7 @@ def ablate(task: tuple[str, Sequence[str], str]) -> dict[str, list[Difference]]:
     chosen = [switch for switch in SWITCHES if switch.name in names]
     effective: set[str] = set()
     tolerances = Golden(TABLE).tolerances
-    with patch.object(pipeline, "clean_square", _remembering(pipeline.clean_square)):
+    with patch.object(drawing, "clean_square", _remembering(drawing.clean_square)):
         with _watched(chosen, effective):
             before = figures_of(place, scene, variant)
         found = {}

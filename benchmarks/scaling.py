@@ -25,11 +25,10 @@ from queue import SimpleQueue
 from typing import Any
 
 import numpy as np
-from rail_extract.core import pipeline
 from rail_extract.core.clouds.las import laspy
 from rail_extract.core.clouds.points import ask
 from rail_extract.core.kernels import blas, one_thread
-from rail_extract.core.pipeline import Parameters, extract_files, extract_rails
+from rail_extract.core.pipeline import Parameters, drawing, extract_files, extract_rails
 from rail_extract.core.pipeline.sources import Classified
 from rail_extract.core.progress import SILENT, Progress
 from rail_extract.core.rails import RailLine, Support
@@ -281,8 +280,8 @@ def in_own_process(folder: Path, lines: str) -> dict:
 def measure(folder: Path, drawn: bool) -> dict:
     """Extract the clouds in a folder; return core-seconds by step, peak memory and sizes in bytes."""
     if not drawn:
-        pipeline.clean_square, pipeline.rails_of_square = (lambda *_: None), laid_rails
-    draw_squares = pipeline._draw_squares
+        drawing.clean_square, drawing.rails_of_square = (lambda *_: None), laid_rails
+    draw_squares = drawing.Drawing.run
     marks = []
 
     def marked(*arguments):
@@ -292,7 +291,7 @@ def measure(folder: Path, drawn: bool) -> dict:
         finally:
             marks.append(time.process_time())
 
-    pipeline._draw_squares = marked
+    drawing.Drawing.run = marked
     engine_for(parameters())  # loads the packages, which happens only once
     start = time.perf_counter()
     with tempfile.TemporaryDirectory() as work:
