@@ -6,12 +6,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 from heard import Heard
-from rail_extract.core import pipeline
 from rail_extract.core.checks.lines import warn_of_split_classes
 from rail_extract.core.clouds.points import RailPoints
 from rail_extract.core.errors import Cancelled, ParameterError
 from rail_extract.core.frame import LocalFrame
-from rail_extract.core.pipeline import Parameters, extract_files, extract_rails
+from rail_extract.core.pipeline import Parameters, drawing, extract_files, extract_rails
 from rail_extract.core.polyline import length_along, project
 from rail_extract.core.rails import RailLine, SearchFigures
 from rail_extract.core.raster import cell_size, rasterize
@@ -307,7 +306,7 @@ def test_the_progress_rises_to_the_end_and_cleaning_has_its_share_of_it(monkeypa
     settings = Parameters(1.435, STANDARDS["EN_60E1_1435"].head_width_m, square_tiles=4, quality_step_m=1.0)
     extract_rails([straight().rail_points()], settings, heard)
     assert len(cleaning) > 2
-    share = pipeline.CLEAN_S / (pipeline.CLEAN_S + pipeline.DRAW_S)
+    share = drawing.CLEAN_S / (drawing.CLEAN_S + drawing.DRAW_S)
     assert sum(cleaning) == pytest.approx(share * 0.9, abs=1e-9)
     assert (np.diff(heard.fractions) >= -1e-12).all()
     assert min(heard.fractions) >= 0.0 and heard.fractions[-1] == max(heard.fractions) == 1.0
