@@ -59,7 +59,8 @@ def extract_rails(
 
     Examples
     --------
-    >>>     >>> from rail_extract.core.frame import LocalFrame
+    >>> import numpy as np
+    >>> from rail_extract.core.frame import LocalFrame
     >>> random = np.random.RandomState(0)
     >>> x, side = random.uniform(0, 15, 5000), random.randint(2, size=5000)
     >>> y = 1.507 * side + random.uniform(-0.036, 0.036, 5000)

@@ -38,6 +38,7 @@ def killed(tmp_path):
 
 
 def age(folder):
+    """Make a temporary folder old enough to be removed."""
     os.utime(folder / MARK, (0, (folder / MARK).stat().st_mtime - MIN_AGE_S - 1))
 
 
@@ -133,13 +134,6 @@ def write(destination, text="new", *others):
 
 def temporary(folder):
     return [entry.name for entry in folder.iterdir() if entry.name.startswith(PREFIX)]
-
-
-def age_of_disk(folder):
-    """Make temporary folders old enough to be removed."""
-    for name in temporary(folder):
-        mark = folder / name / "in_use"
-        os.utime(mark, (0, mark.stat().st_mtime - MIN_AGE_S - 1))
 
 
 @pytest.mark.parametrize(
@@ -344,7 +338,8 @@ def test_killed_at_any_move_a_folder_is_old_or_new_after_the_next_run(tmp_path, 
         target.mkdir()
         (target / "tile").write_text("old")
     subprocess.run([sys.executable, "-c", KILLED_FOLDER, str(target), str(moves)])
-    age_of_disk(tmp_path)
+    for made in temporary(tmp_path):
+        age(tmp_path / made)
     Destination.at(tmp_path / "other.txt")
     assert (target / "tile").read_text() == text
     assert temporary(tmp_path) == []
@@ -359,7 +354,7 @@ def test_killed_at_any_move_a_folder_is_old_or_new_after_the_next_run(tmp_path, 
     ],
 )
 def test_killed_at_any_move_a_set_is_old_or_new_or_cannot_be_opened_until_the_next_run(tmp_path, name, before, after):
-    """The set that opens has files of one age_of_disk, and the next run into the folder leaves a complete set."""
+    """The set that opens has files of one run, and the next run into the folder leaves a complete set."""
     survived = False
     for moves in range(12):
         folder = tmp_path / f"{moves}"
@@ -372,7 +367,8 @@ def test_killed_at_any_move_a_set_is_old_or_new_or_cannot_be_opened_until_the_ne
             assert len(set(contents(folder).values())) == 1
         elif before:
             assert len(after) > 1  # a single file is never absent
-        age_of_disk(folder)
+        for made in temporary(folder):
+            age(folder / made)
         write(Destination.at(folder / "other.txt"))
         (folder / "other.txt").unlink()
         sets = [{f"a{suffix}": text for suffix in suffixes} for suffixes, text in ((before, "old"), (after, "new"))]
@@ -388,7 +384,8 @@ def test_an_interrupted_move_does_not_overwrite_what_the_user_has_written_since(
     assert subprocess.run(call).returncode == -signal.SIGKILL
     (tmp_path / "a.shp").write_text("mine")
     (tmp_path / "a.dbf").write_text("mine")
-    age_of_disk(tmp_path)
+    for made in temporary(tmp_path):
+        age(tmp_path / made)
     Destination.at(tmp_path / "other.txt")
     assert contents(tmp_path) == {"a.shp": "mine", "a.dbf": "mine"}
     assert temporary(tmp_path) == []

@@ -9,7 +9,6 @@ import pytest
 import rail_extract as rx
 from rail_extract.core.errors import ParameterError
 from rail_extract.core.fields import CENTERLINE_FIELDS, QUALITY_FIELDS, RAIL_FIELDS
-from rail_extract.laboratory.scenes.las import write_las
 
 SAMPLE = Path(rx.__file__).parent / "resources" / "sample" / "sample.laz"
 
@@ -46,14 +45,6 @@ def test_a_geopackage_gets_all_layers(network, tmp_path):
     assert pyogrio.read_info(tmp_path / "out.gpkg", layer="rails")["features"] == len(network.found.rails)
 
 
-def test_other_files_get_one_layer(network, tmp_path):
-    pytest.importorskip("pyogrio")
-    network.save(tmp_path / "rails.csv")
-    network.save(str(tmp_path / "tracks.csv"), "centerlines")
-    assert len((tmp_path / "rails.csv").read_text().splitlines()) == 1 + len(network.found.rails)
-    assert len((tmp_path / "tracks.csv").read_text().splitlines()) == 1 + len(network.found.centerlines)
-
-
 def test_a_table_has_fields_geometry_and_coordinate_system(network):
     pytest.importorskip("geopandas")
     table = network.to_geodataframe("rails")
@@ -65,18 +56,10 @@ def test_a_table_has_fields_geometry_and_coordinate_system(network):
     np.testing.assert_allclose(place, network.frame.to_crs(network.found.rails[0].xyz[:1])[0], atol=1e-6)
 
 
-def test_the_report_names_file_and_call(network, tmp_path):
-    network.report(tmp_path / "out.html")
-    page = (tmp_path / "out.html").read_text(encoding="utf-8")
-    assert "sample.laz" in page
-    assert "rail_extract.extract(" in page
-
-
 @pytest.mark.parametrize(
     ("call", "said"),
     [
         (lambda network: network.save("out.shp"), "out.shp can't be written: let the name end in .gpkg or .dxf"),
-        (lambda network: network.save("out.gpkg", "tracks"), "There is no layer 'tracks': choose one of rails"),
         (lambda network: rx.extract(SAMPLE, standard="UIC60"), "standard can't be UIC60: give one of its 48 choices"),
     ],
 )
@@ -84,20 +67,3 @@ def test_a_wrong_argument_is_refused_with_a_remedy(network, call, said):
     with pytest.raises(ParameterError) as refused:
         call(network)
     assert said in str(refused.value)
-
-
-def test_raw_points_are_classified_into_a_copy_from_which_rails_come(tmp_path):
-    laspy = pytest.importorskip("laspy")
-    from rail_extract.laboratory.scenes.raw_catalogue import RAW_SCENES
-
-    scene = RAW_SCENES["narrow"](7)
-    write_las(tmp_path / "raw.laz", scene.xyz, offsets=np.zeros(3))
-    figures = rx.classify(tmp_path / "raw.laz", tmp_path / "new.laz", standard="EN_49E1_1000", workers=1).figures
-    assert figures["PAIRED_LENGTH"] == pytest.approx(100, abs=6)
-    labelled = laspy.read(tmp_path / "new.laz").classification
-    assert np.count_nonzero(np.asarray(labelled) == 10) == figures["RAIL_POINTS"]
-    how = {"standard": "EN_49E1_1000", "iterations": 1, "engine": "OPENCV", "workers": 1}
-    found = rx.extract(tmp_path / "new.laz", **how).found
-    direct = rx.extract(tmp_path / "raw.laz", classify=True, **how).found
-    assert len(found.rails) == len(direct.rails) == 2
-    assert direct.search.points == figures["RAIL_POINTS"]

@@ -114,17 +114,6 @@ def test_rays_meet_a_line_where_they_say(seed, ahead):
     assert np.isnan(missed).all()
 
 
-@given(ANGLES)
-def test_feet_have_the_chainage_and_the_offset_of_their_points(angle):
-    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-    t, across = np.array([0.3, 2.5, 7.1, 9.9]), np.array([0.05, -0.08, 0.0, 0.02])
-    line = np.array([[0.0, 0.0], [10.0, 0.0]]) @ turn.T
-    feet = project([line], np.column_stack([t, across]) @ turn.T, 0.1)
-    assert feet.point.tolist() == [0, 1, 2, 3]
-    np.testing.assert_allclose(feet.t, t, atol=1e-9)
-    np.testing.assert_allclose(feet.across, across, atol=1e-9)
-
-
 def test_points_out_of_reach_or_past_an_end_are_left_out():
     line = np.array([[0.0, 0.0], [10.0, 0.0]])
     xy = np.array([[5.0, 0.2], [-0.05, 0.0], [10.05, 0.01], [5.0, 0.09], [1e6, 0.0]])

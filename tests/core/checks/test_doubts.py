@@ -4,16 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from built import centerline_of, rail_of, support_of
 from rail_extract.core.checks.doubts import (
     doubting_jumps,
     doubting_scatter,
     find_jumps,
     gauge_scatter,
 )
-from rail_extract.core.rails import Centerline, RailLine, Support
 from rail_extract.laboratory.curves import Element, trace, transition_curve
-
-LENGTH_M = 20.0
 
 
 def stepped(curve, at_m, step_m):
@@ -23,13 +21,11 @@ def stepped(curve, at_m, step_m):
 
 
 def track(line, *sides):
-    return Centerline(np.column_stack([line, np.zeros(len(line))]), 1, 10, *(sides or ((), ())), *np.zeros(5))
+    return centerline_of(np.column_stack([line, np.zeros(len(line))]), 1, *(sides or ((), ())))
 
 
 def rail(number, line):
-    t = np.arange(0.125, 80.0, 0.25)
-    support = Support(t, np.full(len(t), 10), np.full(len(t), 0.001))
-    return RailLine(np.column_stack([line, np.zeros(len(line))]), number, 10, 800, 20.0, 1.0, 0.0, support=support)
+    return rail_of(line, number, points=800, sigma_mm=1.0, support=support_of(80.0))
 
 
 def beside(curve, left_m):
@@ -116,15 +112,11 @@ OWN_M = 0.002
 
 
 def sure_rail(number):
-    t = np.arange(0.125, 80.0, 0.25)
-    support = Support(t, np.full(len(t), 10), np.full(len(t), OWN_M))
-    xyz = np.column_stack([t, np.zeros((len(t), 2))])
-    return RailLine(xyz, number, 10, 800, 20.0, 1000 * OWN_M, 0.0, support=support)
+    return rail_of([[0.0, 0.0], [80.0, 0.0]], number, sigma_mm=1000 * OWN_M, support=support_of(80.0, OWN_M))
 
 
 def track_of(number, left, right, gaugesd_mm, length_m=80.0, gauge_mm=1435.0):
-    xyz = np.array([[0.0, 0, 0], [length_m, 0, 0]])
-    return Centerline(xyz, number, 10, (left,), (right,), gauge_mm, gaugesd_mm, 0.0, 0.0, 0.0)
+    return centerline_of([[0.0, 0, 0], [length_m, 0, 0]], number, (left,), (right,), gauge_mm, gaugesd_mm)
 
 
 def scatter(rails, *tracks, gauges_m=(1.435,)):

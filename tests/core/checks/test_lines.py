@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from built import centerline_of, rails_of
 from heard import Heard
 from rail_extract.core.checks.lines import displacement, warn_of_blunt_lines, warn_of_rails, with_tracks
 from rail_extract.core.parameters import Parameters
-from rail_extract.core.rails import Centerline, RailLine
 from rail_extract.laboratory.curves import Element, trace
 
 CURVE = trace([Element(60.0, 1 / 400, 1 / 400)], heading=0.4)
@@ -18,20 +18,15 @@ def line(left_m, up_m, part=slice(None, None, 10)):
     return np.column_stack([CURVE.offset(left_m), HEIGHT + up_m])[part]
 
 
-def rail(number, xyz):
-    return RailLine(xyz, number, 10, points=100, resid_mm=20.0, sigma_mm=1.0, bridged_m=0.0)
-
-
-def track(number, left, right):
-    return Centerline(line(0.0, 0.0), number, 10, (left,), (right,), 1435.0, 1.0, 0.0, 0.0, 0.0)
+def track(track_id, right):
+    return centerline_of(line(0.0, 0.0), track_id, (1,), (right,))
 
 
 def found(*others):
     """What is kept of lines next to a track of the rails 1 and 3, and what is said; the others are 2, 4, 5 …"""
-    rails = [rail(1, line(0.75, 0.0)), rail(2, others[0]), rail(3, line(-0.75, 0.0))]
-    rails += [rail(number, other) for number, other in enumerate(others[1:], start=4)]
+    rails = rails_of(line(0.75, 0.0), others[0], line(-0.75, 0.0), *others[1:])
     heard = Heard()
-    return with_tracks(rails, [track(7, 1, 3)], heard), heard.warnings
+    return with_tracks(rails, [track(7, 3)], heard), heard.warnings
 
 
 @pytest.mark.parametrize(
@@ -68,21 +63,9 @@ def test_a_wire_that_begins_next_to_a_track_and_leaves_it_is_judged_where_they_r
 
 
 def test_a_rail_of_two_tracks_states_both():
-    rails = [rail(number, line(left_m, 0.0)) for number, left_m in ((1, 0.75), (2, -0.75), (3, -0.4))]
-    kept = with_tracks(rails, [track(1, 1, 2), replace(track(2, 1, 3), left_ids=(1, 1))])
+    rails = rails_of(*(line(left_m, 0.0) for left_m in (0.75, -0.75, -0.4)))
+    kept = with_tracks(rails, [track(1, 2), replace(track(2, 3), left_ids=(1, 1))])
     assert [one.track_ids for one in kept] == [(1, 2), (1,), (2,)]
-
-
-def test_what_is_left_out_is_said():
-    rails = [rail(1, line(0.75, 0)), rail(2, line(-0.75, 0)), rail(3, line(-1.65, 0.55)), rail(4, line(0.2, 5.3))]
-    heard = Heard()
-    kept = with_tracks(rails, [track(1, 1, 2)], heard)
-    assert len(kept) == 2
-    (warning,) = heard.warnings
-    assert warning.startswith("2 lines (120 m) left out: too high or too low")
-    assert "(+0.5 m, +5.3 m)" in warning or "(+0.6 m, +5.3 m)" in warning
-    with_tracks(rails[:2], [track(1, 1, 2)], heard)
-    assert len(heard.warnings) == 1
 
 
 def arc(radius_m, length_m=40.0):
@@ -92,8 +75,7 @@ def arc(radius_m, length_m=40.0):
 
 def warned(line, smoothing_m):
     heard = Heard()
-    rails = [rail(1, np.column_stack([line, np.zeros(len(line))]))]
-    warn_of_rails(rails, 10, Parameters(1.435, 0.072, smoothing_xy_m=smoothing_m), heard)
+    warn_of_rails(rails_of(line), 10, Parameters(1.435, 0.072, smoothing_xy_m=smoothing_m), heard)
     return heard.warnings
 
 
@@ -128,5 +110,5 @@ def test_the_user_is_told_how_much_only_blunt_points_show():
     heard = Heard()
     warn_of_blunt_lines([], heard)
     assert not heard.warnings
-    warn_of_blunt_lines([rail(1, line(0.75, 0.0)), rail(2, line(-0.75, 0.0))], heard)
+    warn_of_blunt_lines(rails_of(line(0.75, 0.0), line(-0.75, 0.0)), heard)
     assert len(heard.warnings) == 1 and "on 120 m" in heard.warnings[0]

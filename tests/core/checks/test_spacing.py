@@ -2,13 +2,11 @@
 
 import numpy as np
 import pytest
+from built import source_of
 from heard import Heard
 from rail_extract.core.checks.spacing import measure_spacings, warn_of_gauge, warn_of_spacing
-from rail_extract.core.clouds.points import RailPoints
-from rail_extract.core.frame import LocalFrame
 from rail_extract.core.parameters import Parameters
 from rail_extract.core.standards import GAUGE_RANGE_MM, HEAD_WIDTH_RANGE_MM, STANDARDS, closest_standard
-from rail_extract.core.tiles.grid import MemorySource
 
 WIDTH = 0.072
 
@@ -107,8 +105,8 @@ def test_coordinates_in_the_right_unit_are_no_warning():
 
 @pytest.mark.parametrize(("gauge_m", "proposed"), [(1.435, []), (1.52, ["RU_R65_1520"])])
 def test_found_points_of_another_gauge_lead_to_their_standard(gauge_m, proposed):
-    heard, points = Heard(), RailPoints(track(gauge_m + 0.075, 0.075), LocalFrame(np.zeros(3)), 10)
-    assert warn_of_spacing(MemorySource(points, 500.0), Parameters(1.435, WIDTH), heard) == bool(proposed)
+    heard, points = Heard(), source_of(track(gauge_m + 0.075, 0.075))
+    assert warn_of_spacing(points, Parameters(1.435, WIDTH), heard) == bool(proposed)
     assert heard.proposed == proposed
     assert [f"Rails are {1000 * gauge_m + 75:.0f} mm apart" in text for text in heard.warnings] == [True] * len(
         proposed

@@ -4,22 +4,20 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from built import rails_of, source_of, tracks
 from heard import Heard
 from rail_extract.core.checks.spacing import SEEN_SHARE
 from rail_extract.core.checks.standard import head_widths, warn_of_raw
-from rail_extract.core.clouds.points import RailPoints
-from rail_extract.core.frame import LocalFrame
 from rail_extract.core.parameters import Parameters
-from rail_extract.core.rails import RailLine, SearchFigures
+from rail_extract.core.rails import SearchFigures
 from rail_extract.core.tiles.grid import MemorySource
-from rail_extract.laboratory.curves import Element, trace, transition_curve
+from rail_extract.laboratory.curves import Element, trace
 from rail_extract.laboratory.scenes.adversarial import from_the_side
 from rail_extract.laboratory.scenes.raw_strips import strip
 from rail_extract.laboratory.scenes.strips import two_passes
 
 WIDTH = 0.072
 LINE = trace([Element(40.0)], heading=0.4)
-CURVE = trace(transition_curve(15, 20, 15, 1 / 300), heading=-0.6)
 
 
 class Sampled:
@@ -43,9 +41,9 @@ def heads_of(curve, width_m, gauge_m=1.435, count=40_000):
 
 @pytest.mark.parametrize(("width_m", "count"), [(0.062, 1), (0.068, 0), (0.072, 0), (0.076, 0), (0.084, 1)])
 def test_heads_of_another_width_than_stated_are_said(width_m, count):
-    points = RailPoints(heads_of(LINE, SEEN_SHARE * width_m), LocalFrame(np.zeros(3)), 10)
+    points = source_of(heads_of(LINE, SEEN_SHARE * width_m))
     heard = Heard()
-    widths = head_widths(MemorySource(points, 500.0), ((1.435, 0.072),), heard)
+    widths = head_widths(points, ((1.435, 0.072),), heard)
     assert widths.seen_m == pytest.approx(width_m, abs=0.002)
     assert widths.differ == (count == 1)
     assert len(heard.warnings) == count
@@ -54,10 +52,10 @@ def test_heads_of_another_width_than_stated_are_said(width_m, count):
 
 
 def test_heads_of_another_standard_are_not_said_where_the_gauge_is_another_one():
-    points = RailPoints(heads_of(LINE, SEEN_SHARE * 0.062, gauge_m=1.0), LocalFrame(np.zeros(3)), 10)
+    points = source_of(heads_of(LINE, SEEN_SHARE * 0.062, gauge_m=1.0))
     for gauge_m, count in ((1.0, 1), (1.435, 0)):
         heard = Heard()
-        assert head_widths(MemorySource(points, 500.0), ((gauge_m, 0.072),), heard).differ
+        assert head_widths(points, ((gauge_m, 0.072),), heard).differ
         assert len(heard.warnings) == count
 
 
@@ -77,9 +75,7 @@ def test_noise_and_faces_do_not_widen_heads_and_a_single_face_is_no_head():
         (from_the_side("one", 44, 20.0, noise_m=0.004, length_m=30.0, top_share=0.0), "one side only"),
     ):
         heard = Heard()
-        rails = [RailLine(rail, 1, 10, 1.0, 1.0, 1.0, 0.0) for rail in scene.rails]
-        source = MemorySource(scene.rail_points(), 500.0)
-        head_widths(source, ((1.435, 0.072),), heard, rails)
+        head_widths(MemorySource(scene.rail_points(), 500.0), ((1.435, 0.072),), heard, rails_of(*scene.rails))
         assert len(heard.warnings) == bool(said)
         assert all(said in text for text in heard.warnings)
 
@@ -89,13 +85,8 @@ def test_blunt_heads_are_said_and_their_width_is_not_measured():
     points = heads_of(LINE, 0.112, gauge_m=1.435 + WIDTH - 0.112)
     left = np.abs((points[:, :2] - LINE.xy[0]) @ LINE.left_normal[0]) - 0.5 * (1.435 + WIDTH)
     points[:, 2] = rng.normal(0, 0.012, len(points)) - 5.0 * left**2
-    rails = []
-    for side in (0.5, -0.5):
-        xy = LINE.xy + side * (1.435 + WIDTH) * LINE.left_normal
-        rails.append(RailLine(np.column_stack([xy, np.zeros(len(xy))]), 1, 10, 1.0, 1.0, 1.0, 0.0))
-    heard = Heard()
-    source = MemorySource(RailPoints(points, LocalFrame(np.zeros(3)), 10), 500.0)
-    widths = head_widths(source, ((1.435, WIDTH),), heard, rails)
+    heard, rails = Heard(), rails_of(*tracks(LINE, 0.0))
+    widths = head_widths(source_of(points), ((1.435, WIDTH),), heard, rails)
     assert not widths.differ and np.isnan(widths.seen_m)
     (warning,) = heard.warnings
     assert warning.startswith("Heads are blunt") and "72 mm" in warning

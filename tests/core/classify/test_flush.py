@@ -44,13 +44,6 @@ def test_grooves_at_another_distance_are_not_rails():
     assert not classify_square(xyz, Settings((1.0,), WIDTH)).rail.any()
 
 
-def test_the_order_of_points_does_not_matter():
-    xyz, _, _ = street(0.003)
-    order = np.random.RandomState(2).permutation(len(xyz))
-    found = classify_square(xyz, SETTINGS).rail
-    np.testing.assert_array_equal(classify_square(xyz[order], SETTINGS).rail, found[order])
-
-
 @pytest.mark.parametrize("seen_m", [(0.0, 0.012), (0.030, GROOVE)])
 def test_a_groove_whose_one_wall_is_hidden_gives_the_same_axes(seen_m):
     xyz, on, inside = street(0.002)

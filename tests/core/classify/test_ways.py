@@ -9,8 +9,7 @@ from rail_extract.core.classify.settings import Settings, Way
 from rail_extract.core.classify.square import classify_square
 from rail_extract.core.classify.ways import blunt_among, blunt_sources, is_blunt, search_alike
 from rail_extract.core.rails import SearchFigures
-from rail_extract.laboratory.ruler.classification import lines_from, score, settings_of
-from rail_extract.laboratory.ruler.whole_clouds import classify_cloud
+from rail_extract.laboratory.ruler.classification import lines_from, score
 from rail_extract.laboratory.scenes.raw_catalogue import DRONE, RAW_SCENES, double_track
 from scipy.special import ndtr
 
@@ -90,13 +89,6 @@ def test_the_blur_is_that_of_rails():
     figures = classify_square(xyz, Settings((1.435,), 0.072, way=Way.BLUNT)).figures
     assert figures.blunt_m == pytest.approx(2 * 16.0, rel=0.1)
     assert figures.blur_m == pytest.approx(0.062, rel=0.2)
-
-
-def test_a_blunt_cloud_is_blunt_everywhere():
-    scene = RAW_SCENES["photo curve blunt"](2)
-    figures = classify_cloud(scene.xyz, settings_of(scene)).figures
-    assert figures.blunt_m == pytest.approx(figures.paired_m + figures.single_m)
-    assert figures.blunt_m > 200
 
 
 def filled_track(share: float, per_m2: int) -> np.ndarray:

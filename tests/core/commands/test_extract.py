@@ -7,7 +7,6 @@ import shutil
 import signal
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pyproj
@@ -28,7 +27,6 @@ from rail_extract.core.pipeline import Parameters, extract_files, extract_rails 
 from rail_extract.core.report import Origin  # noqa: E402
 from rail_extract.core.standards import STANDARDS  # noqa: E402
 
-ROOT = Path(__file__).resolve().parents[3]
 STANDARD = STANDARDS["EN_60E1_1435"]
 FAST = ["--iterations", "1", "--square-tiles", "4", "--engine", "OPENCV"]
 PARAMETERS = Parameters(
@@ -127,13 +125,6 @@ def test_a_corrupt_tile_is_named_and_the_rest_is_written(tiles, scheduler, tmp_p
     assert 50 < values(out, "rails")["length_m"].sum() < 85
     assert pyogrio.read_info(out, layer="centerlines")["features"] == 1
     assert {file.name for file in tmp_path.iterdir()} == {"out.gpkg", "tile0.laz", "tile1.laz", "tile2.laz"}
-
-
-def test_two_names_of_one_file_hold_both_layers(tiles, scheduler, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    words = ["extract", str(tiles), "--rails", "two.gpkg", "--centerlines", str(tmp_path / "two.gpkg")]
-    assert main([*words, *scheduler, *FAST]) == 0
-    assert {name for name, _ in pyogrio.list_layers("two.gpkg")} == {"rails", "centerlines"}
 
 
 def test_warnings_are_on_the_error_output(tiles, scheduler, tmp_path, capsys):
@@ -243,18 +234,3 @@ def test_a_run_that_was_killed_continues_where_it_stopped(tiles, tmp_path):
     after = {file: file.stat().st_mtime_ns for file in work.glob("*.npz")}
     assert before.items() < after.items()
     assert values(out, "rails")["length_m"].sum() == pytest.approx(100, abs=1)
-
-
-def test_only_commands_that_are_installed_are_listed(tmp_path):
-    package = tmp_path / "rail_extract"
-    shutil.copytree(ROOT / "core", package / "core", ignore=shutil.ignore_patterns("__pycache__"))
-    for name in ("__init__.py", "__main__.py"):
-        shutil.copy(ROOT / name, package / name)
-    environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
-    words = [sys.executable, "-m", "rail_extract", "--help"]
-    listed = subprocess.run(words, capture_output=True, text=True, env=environment, cwd=tmp_path).stdout
-    assert "extract" in listed and "onnx" in listed
-    assert "scenes" not in listed and "evaluate" not in listed
-    shutil.copytree(ROOT / "laboratory", package / "laboratory", ignore=shutil.ignore_patterns("__pycache__"))
-    listed = subprocess.run(words, capture_output=True, text=True, env=environment, cwd=tmp_path).stdout
-    assert "train" in listed and "scenes" in listed

@@ -134,18 +134,6 @@ def raw(save):
     return str(save(STRIP.xyz, "raw.las", "EPSG:25832"))
 
 
-def test_a_copy_has_the_rail_that_grew_from_a_seed(raw, tmp_path, capsys):
-    new = tmp_path / "out" / "new.las"
-    assert main(["grow", raw, "--output", str(new), "--seed", f"{X},{Y}", "--rail-class", "20", "--no-both"]) == 0
-    found = np.asarray(laspy.read(new).classification) == 20
-    left = STRIP.head & (STRIP.xyz[:, 1] > 0)
-    assert (found & left).sum() > 0.94 * left.sum()
-    assert not found[STRIP.xyz[:, 1] < 0].any()
-    said = capsys.readouterr()
-    assert f"{found.sum()} of {len(found)} points are on rails" in said.out
-    assert ": at both ends, the cloud ends." in said.err
-
-
 def test_seeds_of_a_file_are_transformed(raw, tmp_path):
     pytest.importorskip("pyogrio")
     longitude, latitude = pyproj.Transformer.from_crs(25832, 4326, always_xy=True).transform(X, Y)

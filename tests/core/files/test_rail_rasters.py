@@ -27,9 +27,6 @@ rasterio = pytest.importorskip("rasterio")
 STANDARD = STANDARDS["EN_60E1_1435"]
 CELL_M = cell_size(STANDARD.gauge_m, STANDARD.head_width_m)
 
-from rail_extract.core.raster import cell_size  # noqa: E402
-from rail_extract.core.standards import STANDARDS  # noqa: E402
-
 
 def source(path):
     return RasterSource(path, open_with_rasterio)
@@ -233,15 +230,3 @@ def test_each_class_is_a_band_at_its_place(tmp_path, crs, unit_m, epsg):
             expected = frame.to_crs(np.column_stack([raster.to_local(raster.cells()), np.zeros(len(cells))]))
             np.testing.assert_allclose(np.sort(x), np.sort(expected[:, 0]), rtol=0, atol=1e-6)
             np.testing.assert_allclose(np.sort(y), np.sort(expected[:, 1]), rtol=0, atol=1e-6)
-
-
-def test_empty_blocks_take_no_space(tmp_path):
-    ends = np.concatenate([line(10), [7000.0, 7000.0] + line(10)])
-    raster = rasterize(ends, CELL_M)
-    header = header_for([raster], (10,), LocalFrame(np.zeros(3), crs_wkt="EPSG:25832"), STANDARD)
-    assert header.window[2] * header.window[3] > 30e9
-    write_rasters(tmp_path / "out.tif", header, [raster])
-    assert (tmp_path / "out.tif").stat().st_size < 1_000_000
-    with rasterio.open(tmp_path / "out.tif") as file:
-        last = rasterio.windows.Window(file.width - 4 * TILE, 0, 4 * TILE, 4 * TILE)
-        assert np.count_nonzero(file.read(1, window=last)) > 100

@@ -22,32 +22,18 @@ XYZ = np.array([[0.0, 0.0, 1.0], [3.0, 4.0, 1.0]])
 RAIL = RailLine(XYZ, 3, 10, 417, 1.54, 0.416, np.nan)
 TRACK = Centerline(XYZ, 1, 10, (3, 5), (4,), 1435.04, 0.26, -3.04, -7.11, 0.0)
 STATIONS = TrackGeometry(
-    1,
-    XYZ,
-    np.array([0.0, 5.0]),
-    np.array([1435.04, np.nan]),
-    np.array([-3.04, 2.0]),
-    np.array([np.nan, 0.1]),
-    np.array([350.26, np.nan]),
-    np.array([1.234, 5.678]),
-    np.array([0.416, 0.2]),
-    np.array([12, 0]),
-    np.array([False, True]),
-    np.array([2, 1]),
-    np.array([3.456, np.nan]),
-    np.array([0.789, np.nan]),
+    *(1, XYZ, np.array([0.0, 5.0]), np.array([1435.04, np.nan]), np.array([-3.04, 2.0]), np.array([np.nan, 0.1])),
+    *(np.array([350.26, np.nan]), np.array([1.234, 5.678]), np.array([0.416, 0.2]), np.array([12, 0])),
+    *(np.array([False, True]), np.array([2, 1]), np.array([3.456, np.nan]), np.array([0.789, np.nan])),
 )
 
 
 def test_a_file_holds_lines_and_points_with_their_fields(tmp_path):
     path = tmp_path / "all.gpkg"
     destination = Destination.at(path)
-    layers = [
-        lines_layer(RAILS, [RAIL]),
-        lines_layer(CENTERLINES, [TRACK]),
-        quality_layer([STATIONS]),
-    ]
-    write_layers(layers, destination, FRAME)
+    write_layers(
+        [lines_layer(RAILS, [RAIL]), lines_layer(CENTERLINES, [TRACK]), quality_layer([STATIONS])], destination, FRAME
+    )
     found = {name: pyogrio.raw.read(path, layer=name) for name, _ in pyogrio.list_layers(path)}
     assert list(found) == ["rails", "centerlines", "quality"]
     for (meta, _, geometry, _), fields, kind in zip(
@@ -93,11 +79,7 @@ def test_the_other_tables_of_a_file_stay(tmp_path):
     write_layers([lines_layer(replace(RAILS, style="signals"), [RAIL] * 3)], destination, FRAME)
     write_layers([lines_layer(RAILS, [RAIL] * 2)], destination, FRAME)
     before = path.read_bytes()
-    layers = [
-        lines_layer(RAILS, [RAIL]),
-        quality_layer([STATIONS]),
-    ]
-    write_layers(layers, destination, FRAME)
+    write_layers([lines_layer(RAILS, [RAIL]), quality_layer([STATIONS])], destination, FRAME)
     assert path.read_bytes() != before
     counts = {name: pyogrio.read_info(path, layer=name)["features"] for name, _ in pyogrio.list_layers(path)}
     assert counts == {"signals": 3, "rails": 1, "quality": 2}

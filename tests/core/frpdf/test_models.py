@@ -98,12 +98,6 @@ def test_an_archive_that_states_too_small_a_size_is_refused_within_little_memory
         tracemalloc.stop()
 
 
-def test_arrays_by_columns_are_read_as_numpy_reads_them(tmp_path):
-    array = np.asfortranarray(np.arange(6, dtype=np.float32).reshape(2, 3))
-    np.savez(tmp_path / "weights.npz", here=array)
-    assert np.array_equal(load_arrays(tmp_path / "weights.npz")["here"], array)
-
-
 @pytest.mark.parametrize("model", MODELS, ids=lambda model: model.name)
 def test_the_weights_reach_their_f1(model):
     engine = make_engine(load_arrays(model.path))

@@ -5,20 +5,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from built import cloud_of, rails_of, source_of
 from heard import Heard
 from rail_extract.core.checks.lines import warn_of_split_classes
-from rail_extract.core.clouds.points import RailPoints
 from rail_extract.core.errors import Cancelled, ParameterError
-from rail_extract.core.frame import LocalFrame
 from rail_extract.core.pipeline import Parameters, drawing, extract_files, extract_rails
 from rail_extract.core.polyline import length_along, project
-from rail_extract.core.rails import RailLine, SearchFigures
+from rail_extract.core.rails import SearchFigures
 from rail_extract.core.raster import cell_size, rasterize
 from rail_extract.core.run.loop import Runner
 from rail_extract.core.squares import steps
 from rail_extract.core.squares.steps import lines_of
 from rail_extract.core.standards import STANDARDS, RailStandard
-from rail_extract.core.tiles.grid import MemorySource, SortedPoints
+from rail_extract.core.tiles.grid import SortedPoints
 from rail_extract.core.tracks.centerlines import tracks_of
 from rail_extract.laboratory.curves import Element, trace, transition_curve
 from rail_extract.laboratory.scenes.plain import straight
@@ -33,7 +32,7 @@ CURVES = [trace([Element(40.0)], heading=0.4), trace(transition_curve(15, 20, 15
 def rails_at(curve, *lefts):
     """Exact rails at distances to the left of a curve."""
     lines = [np.column_stack([curve.offset(left), np.full(len(curve.xy), 100.0)]) for left in lefts]
-    return [RailLine(line, number, 10, 100, 1.0, 0.1, 0.0) for number, line in enumerate(lines, start=1)]
+    return rails_of(*lines, points=100)
 
 
 @pytest.mark.parametrize("curve", CURVES)
@@ -122,7 +121,7 @@ def test_lines_without_points_stay_in_their_cells_and_have_no_heights():
     xyz = np.column_stack([along, 0.3 * along, np.full(len(along), 100.0)])
     raster = rasterize(xyz, cell_size(1.435, WIDTH))
     (flat,) = lines_of(raster, 11, None, Parameters(1.435, WIDTH), first_id=4)
-    (high,) = lines_of(raster, 11, RailPoints(xyz, LocalFrame(np.zeros(3)), 11), Parameters(1.435, WIDTH), first_id=4)
+    (high,) = lines_of(raster, 11, cloud_of(xyz, code=11), Parameters(1.435, WIDTH), first_id=4)
     assert (
         (flat.rail_id, flat.class_code, flat.points) == (4, 11, 0) == (high.rail_id, high.class_code, 0 * high.points)
     )
@@ -171,7 +170,7 @@ def test_the_minimum_length_is_that_of_whole_lines_not_of_their_parts_in_squares
     monkeypatch.setattr(steps, "clean", lambda raster, *_: raster)
     lines = [np.arange(-30, end, 0.005) for end in (90, 60)]
     points = [np.column_stack([x, np.full(len(x), 5.0 + 4 * y), np.full(len(x), 100.0)]) for y, x in enumerate(lines)]
-    cloud = RailPoints(np.concatenate(points), LocalFrame(np.zeros(3)), 10)
+    cloud = cloud_of(*points)
     for shortest, lengths in ((1, [120, 90]), (60, [120, 90]), (100, [120]), (130, [])):
         settings = Parameters(1.435, WIDTH, min_length_m=shortest, square_tiles=4)
         found = _by_length(extract_rails([cloud], settings).rails)[::-1]
@@ -188,7 +187,7 @@ def test_the_width_of_heads_may_depend_on_the_gauge(monkeypatch):
         track = Track(curve, spacing_m, np.full(len(curve.xy), 100.0), left_m=left_m)
         plan = Plan([track], standard, Scanner(left_m=left_m))
         clouds.append(build("mixed", plan, np.random.RandomState(1)).rail_points().xyz)
-    points = RailPoints(np.concatenate(clouds), LocalFrame(np.zeros(3)), 10)
+    points = cloud_of(*clouds)
     settings = Parameters(1.435, WIDTH, quality_step_m=2.0, other_gauges_m=(1.0,))
     for heads_m, narrow_mm in (((), 994.0), ((0.066,), 1000.0)):
         found = extract_rails([points], replace(settings, other_heads_m=heads_m))
@@ -241,7 +240,7 @@ def test_a_blunt_ridge_without_a_partner_is_a_rail_only_if_someone_says_so(monke
     monkeypatch.setattr(steps, "clean", lambda raster, *_: raster)
     half = 0.5 * (1.435 + WIDTH)
     xyz = ridges(np.random.RandomState(6), half, -half, 6.0)
-    source = MemorySource(RailPoints(xyz, LocalFrame(np.zeros(3)), 10), 500.0)
+    source = source_of(xyz)
     points = SortedPoints([source], SearchFigures(blunt_m=300.0), only_pairs=classify)
     network = extract_files(Given(points), tmp_path, Parameters(1.435, WIDTH), Runner())
     assert len(network.rails) == (2 if classify else 3)
@@ -253,7 +252,7 @@ def test_errors_of_blunt_rails_explain_what_their_gauge_scatters(monkeypatch):
     monkeypatch.setattr(steps, "clean", lambda raster, *_: raster)
     half = 0.5 * (1.435 + WIDTH)
     xyz = ridges(np.random.RandomState(5), half, -half, wander_m=0.012)
-    points = RailPoints(xyz, LocalFrame(np.zeros(3)), 10)
+    points = cloud_of(xyz)
     found = extract_rails([points], Parameters(1.435, WIDTH, quality_step_m=1.0))
     (track,) = found.centerlines
     assert 9 < track.gaugesd_mm < 24 / np.sqrt(2)
@@ -269,7 +268,7 @@ def test_a_tile_far_from_the_others_does_not_decide_alone_whether_heads_are_blun
     few = few[few[:, 0] < 20]
     t, side = rng.uniform(0, 100, 40_000), rng.choice([half, -half], 40_000)
     sharp = np.column_stack([t, side + rng.uniform(-WIDTH / 2, WIDTH / 2, len(t)), rng.normal(0, 0.002, len(t))])
-    points = RailPoints(np.concatenate([sharp, few + [900.0, 0.0, 0.0]]), LocalFrame(np.zeros(3)), 10)
+    points = cloud_of(sharp, few + [900.0, 0.0, 0.0])
     parameters = Parameters(1.435, WIDTH, quality_step_m=1.0)
     itself, told, other = (extract_rails([replace(points, blunt=blunt)], parameters) for blunt in (None, False, True))
     assert not itself.heads.blunt and other.heads.blunt
@@ -322,7 +321,7 @@ def scanned_and_surveyed(scanned_m=60.0, imaged=True):
         z = 0.12 * np.exp(-0.5 * (y / 0.06) ** 2) - 0.16 + rng.normal(0, 0.004, 6000)
         parts.append(np.column_stack([x, y + spacing_m * left + 0.03, z]))
     strips = np.repeat([5, 6], [9000, 6000])[: sum(map(len, parts))]
-    return RailPoints(np.concatenate(parts), LocalFrame(np.zeros(3)), 10, strips if imaged else None)
+    return cloud_of(*parts, strips=strips if imaged else None)
 
 
 def test_images_do_not_move_the_lines_of_a_scanner():
@@ -337,7 +336,9 @@ def test_images_do_not_move_the_lines_of_a_scanner():
 
 
 def test_images_show_the_rails_where_the_scanner_does_not():
-    both = extract_rails([scanned_and_surveyed(25.0)], Parameters(1.435, WIDTH, engine="OPENCV", quality_step_m=1.0))
+    both = extract_rails(
+        [scanned_and_surveyed(25.0)], Parameters(1.435, WIDTH, engine="OPENCV", quality_step_m=1.0, keep_cleaned=True)
+    )
     alone = extract_rails([scanned_and_surveyed(25.0, imaged=False)], Parameters(1.435, WIDTH, engine="OPENCV"))
     sharp, blunt = ([rail for rail in both.rails if rail.fills == fills] for fills in (False, True))
     assert [rail.xyz.tolist() for rail in sharp] == [rail.xyz.tolist() for rail in alone.rails]
@@ -351,12 +352,8 @@ def test_images_show_the_rails_where_the_scanner_does_not():
     assert track.length_m > 58
     (geometry,) = both.geometry
     assert len(geometry.chainage_m) == pytest.approx(track.length_m, abs=2)
-    said = [warning for warning in both.warnings if "Where only blunt ones show a rail, on " in warning]
-    assert float(said[0].split("a rail, on ")[1].split(" m")[0]) == pytest.approx(70, abs=2)
-
-
-def test_both_parts_of_a_class_are_in_its_cleaned_raster():
-    both = extract_rails([scanned_and_surveyed(25.0)], Parameters(1.435, WIDTH, engine="OPENCV", keep_cleaned=True))
     (raster,) = both.cleaned
     along = raster.to_local(raster.cells())[:, 0]
     assert all(np.count_nonzero((along > start) & (along < start + 5)) > 200 for start in range(0, 60, 5))
+    said = [warning for warning in both.warnings if "Where only blunt ones show a rail, on " in warning]
+    assert float(said[0].split("a rail, on ")[1].split(" m")[0]) == pytest.approx(70, abs=2)

@@ -3,13 +3,13 @@
 import re
 
 import numpy as np
+from built import ORIGIN, centerline_of, geometry_of
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from rail_extract.core.checks.findings import OFF_GAUGE, examine
-from rail_extract.core.frame import LocalFrame
 from rail_extract.core.progress import metres
-from rail_extract.core.rails import Centerline, RailNetwork, TrackGeometry
+from rail_extract.core.rails import RailNetwork
 from rail_extract.core.report import build_page
 from rail_extract.core.report.limits import MAX_LIMIT_MM, QUANTITIES, lengths_beyond, limits_table
 
@@ -28,19 +28,17 @@ def test_lengths_are_those_of_the_stations_beyond_each_limit(values):
 
 def track(**profiles):
     """A track of 100 m with 20 m off gauge, twist to either side, and 5 m without points, but for `profiles`."""
-    along, plain, none = np.arange(float(COUNT)), np.zeros(COUNT), np.full(COUNT, np.nan)
+    along, plain = np.arange(float(COUNT)), np.zeros(COUNT)
     gauge_mm, bridged = np.full(COUNT, 1435.0), np.zeros(COUNT, dtype=bool)
     gauge_mm[40:60], gauge_mm[90:95], bridged[90:95] = 1420.0, 1800.0, True
-    usual = {"gauge_mm": gauge_mm, "cant_mm": plain - 30, "twist_mm": np.linspace(-8.0, 8.0, COUNT), "radius_m": none}
-    usual |= {"grade_pm": plain, "sigma_mm": plain + 1.5, "points": np.full(COUNT, 100), "bridged": bridged}
-    usual |= {"strips": np.ones(COUNT, int), "strip_mm": none, "sigmaz_mm": plain + 0.5}
+    twist_mm = np.linspace(-8.0, 8.0, COUNT)
+    usual = {"gauge_mm": gauge_mm, "cant_mm": plain - 30, "twist_mm": twist_mm, "bridged": bridged, **profiles}
     xyz = np.column_stack([along, plain, plain])
-    line = Centerline(xyz, 1, 10, (1,), (2,), 1435.0, 1.0, 0.0, 0.0, 0.0)
-    return line, TrackGeometry(1, xyz, along, **{**usual, **profiles})
+    return centerline_of(xyz), geometry_of(xyz, along, **usual)
 
 
 def network(line, geometry):
-    return RailNetwork((), (line,), LocalFrame(np.zeros(3)), "", (geometry,))
+    return RailNetwork((), (line,), ORIGIN, "", (geometry,))
 
 
 def rows_of(html):

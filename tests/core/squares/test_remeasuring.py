@@ -2,12 +2,9 @@
 
 import numpy as np
 import pytest
-from rail_extract.core.clouds.points import RailPoints
-from rail_extract.core.frame import LocalFrame
-from rail_extract.core.rails import RailLine
+from built import cloud_of, rail_of, source_of
 from rail_extract.core.run.loop import Runner
 from rail_extract.core.squares.remeasuring import measure_rails
-from rail_extract.core.tiles.grid import MemorySource
 
 WIDTH = 0.072
 LENGTH, TUNNEL = 300.0, (85.0, 215.0)
@@ -20,14 +17,13 @@ def rail_and_points():
     t = t[(t < TUNNEL[0]) | (t > TUNNEL[1])]
     xyz = np.column_stack([t, random.uniform(-0.5, 0.5, len(t)) * WIDTH, 0.002 * random.standard_normal(len(t))])
     ends = np.array([[0.0, 0.0, 0.0], [LENGTH, 0.0, 0.0]])
-    return RailLine(ends, 7, 10, 30_000, 1.0, 0.5, 0.0), RailPoints(xyz, LocalFrame(np.zeros(3)), 10)
+    return rail_of(ends, 7, points=30_000), cloud_of(xyz)
 
 
 @pytest.mark.parametrize("side", [1000.0, 100.0, 40.0])
 def test_a_tunnel_is_a_gap_whichever_squares_it_crosses(side):
     rail, points = rail_and_points()
-    source = MemorySource(points, side)
-    (measured,) = measure_rails([rail], [source], WIDTH, Runner())
+    (measured,) = measure_rails([rail], [source_of(points.xyz, side_m=side)], WIDTH, Runner())
     np.testing.assert_allclose(measured.gaps, [TUNNEL], atol=0.2)
     support = measured.support
     inside = (support.t > TUNNEL[0] + 1) & (support.t < TUNNEL[1] - 1)
@@ -43,8 +39,7 @@ def test_a_tunnel_is_a_gap_whichever_squares_it_crosses(side):
 def test_heights_are_interpolated_across_a_tunnel_on_a_gradient(side):
     rail, points = rail_and_points()
     lift = 0.03 * points.xyz[:, :1] * [0, 0, 1]
-    source = MemorySource(RailPoints(points.xyz + lift, points.frame, 10), side)
-    (measured,) = measure_rails([rail], [source], WIDTH, Runner())
+    (measured,) = measure_rails([rail], [source_of(points.xyz + lift, side_m=side)], WIDTH, Runner())
     x = np.arange(0.0, LENGTH, 0.5)
     height = np.interp(x, measured.xyz[:, 0], measured.xyz[:, 2])
     np.testing.assert_allclose(height, 0.03 * x, atol=0.006)
@@ -52,8 +47,6 @@ def test_heights_are_interpolated_across_a_tunnel_on_a_gradient(side):
 
 def test_a_rail_away_from_all_points_is_a_gap_from_end_to_end():
     rail, points = rail_and_points()
-    away = RailPoints(points.xyz + [0, 5.0, 0], points.frame, 10)
-    source = MemorySource(away, 1000.0)
-    (measured,) = measure_rails([rail], [source], WIDTH, Runner())
+    (measured,) = measure_rails([rail], [source_of(points.xyz + [0, 5.0, 0])], WIDTH, Runner())
     np.testing.assert_array_equal(measured.gaps, [[0.0, LENGTH]])
     np.testing.assert_allclose(measured.support.sigma_m, WIDTH / np.sqrt(12))

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from built import cloud_of, source_of
 from rail_extract.core.clouds.points import RailPoints
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.frpdf.cleanup import clean
@@ -33,7 +34,7 @@ def test_a_gap_at_a_border_is_bridged_as_in_an_undivided_raster(passes):
     x = side_m + np.concatenate([random.uniform(-25, -1, 8000), random.uniform(1, 25, 8000)])
     left = random.random_sample(len(x)) < 0.5
     y = 10.0 + left * (STANDARD.gauge_m + STANDARD.head_width_m) + random.uniform(-0.03, 0.03, len(x))
-    source = MemorySource(RailPoints(np.column_stack([x, y, np.zeros(len(x))]), LocalFrame(np.zeros(3)), 10), side_m)
+    source = source_of(np.column_stack([x, y, np.zeros(len(x))]), side_m=side_m)
     first, second = lay_out([source], source)
     cell_m, engine = cell_size(parameters.gauge_m, parameters.head_width_m), engine_for(parameters)
     half = round(1.0 / cell_m)  # cells of half a gap
@@ -55,7 +56,7 @@ def test_thin_rails_are_drawn_for_the_network_and_measured_on_their_points():
     random, spacing_m = np.random.RandomState(3), STANDARD.gauge_m + STANDARD.head_width_m
     x, left = random.uniform(0, 40, 400), random.random_sample(400) < 0.5
     y = spacing_m * left + random.uniform(-0.036, 0.036, 400)
-    cloud = RailPoints(np.column_stack([x, y, random.normal(0, 0.01, 400)]), LocalFrame(np.zeros(3)), 10)
+    cloud = cloud_of(np.column_stack([x, y, random.normal(0, 0.01, 400)]))
     alone = clean(rasterize(cloud.xyz, cell_size(STANDARD.gauge_m, STANDARD.head_width_m)), engine_for(parameters))
     assert alone.count() < 500
     rails = extract_rails([cloud], parameters).rails
