@@ -2,6 +2,7 @@
 
 Run `python benchmarks/clearance.py`, or give seeds: `python benchmarks/clearance.py 1 2`. It prints for each seed what
 was found, missed and found where nothing stands, errors of depth against the standard errors, and seconds and memory.
+`--cancel` measures instead how long a run over the densest cloud takes to end when it is cancelled at some moments.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import argparse
 import resource
 import time
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -20,6 +22,8 @@ from rail_extract.core.clearance.measure import Clearance, measure
 from rail_extract.core.clearance.profiles import named
 from rail_extract.core.clearance.settings import Settings
 from rail_extract.core.clouds.points import ask
+from rail_extract.core.errors import Cancelled
+from rail_extract.core.progress import Progress
 from rail_extract.core.run.loop import Runner
 from rail_extract.laboratory.scenes import clearance as scenes
 from scipy.ndimage import gaussian_filter1d
@@ -49,6 +53,10 @@ PLATFORMS = ((20.0, 120.0, -1, 1.70, 0.55), (140.0, 230.0, -1, 1.72, 0.76))
 """From, to, side, offset and height of the platforms."""
 
 
+MANY_PER_M2, MOMENTS = 1500.0, 8
+"""Points per square metre, and parts of a run between which it is cancelled."""
+
+
 @dataclass
 class Score:
     """Errors that add up over the seeds; millimetres."""
@@ -67,9 +75,14 @@ def main() -> None:
     """Print a line for each seed, and one for all."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("seeds", nargs="*", type=int, default=list(DENSITIES))
+    parser.add_argument("--cancel", action="store_true", help="measure how long a cancelled run takes to end")
+    arguments = parser.parse_args()
+    if arguments.cancel:
+        cancel()
+        return
     score = Score()
     print("seed  pts/m2  points  inside missed  false   rms   max  <1s  <2s   seconds")
-    for seed in parser.parse_args().seeds:
+    for seed in arguments.seeds:
         density = DENSITIES.get(seed, 600.0)
         before = (len(score.errors), score.inside, score.missed, score.false)
         points, spent = objects(seed, density, score)
@@ -126,6 +139,39 @@ def _wandering(rng: np.random.RandomState, count: int) -> np.ndarray:
     """Return errors of a line, (count,), with a standard deviation of 1 that wander over some metres."""
     found = gaussian_filter1d(rng.standard_normal(count + 200), CORRELATED_M / scenes.VERTEX_M)[100:-100]
     return found * np.sqrt(2 * np.sqrt(np.pi) * CORRELATED_M / scenes.VERTEX_M)
+
+
+class Cancelling(Progress):
+    """Cancels a run some seconds after its start, if ever."""
+
+    def __init__(self, after_s: float = np.inf) -> None:
+        self.moment = time.monotonic() + after_s
+
+    def is_cancelled(self) -> bool:
+        """Return whether the moment has come."""
+        return time.monotonic() > self.moment
+
+
+def cancel() -> None:
+    """Print how long a run takes to end after it was cancelled, at moments from its start to its end."""
+    scene = scenes.double_track(1, MANY_PER_M2, apart_m=4.5)
+    scenes.bed(scene)
+    for side in (1, -1):
+        scenes.wall(scene, (5.0, 240.0), side, HALF_M - 0.02, (0.2, 6.0))
+    courses = _courses(scene, scene.rng)
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "cloud.laz"
+        scenes.write_points(path, scene.points, scene.codes)
+        given = ask(path, range(256)), courses, Settings(named()[PROFILE])
+        start = time.monotonic()
+        measure(*given, Path(folder) / "whole", Runner(), Cancelling())
+        whole_s = time.monotonic() - start
+        print(f"{len(scene.points) / 1e6:.1f}M points, {whole_s:.1f} s; cancelled after, ended after")
+        for share in np.arange(1, MOMENTS) / MOMENTS:
+            progress = Cancelling(share * whole_s)
+            with suppress(Cancelled):
+                measure(*given, Path(folder) / f"{share}", Runner(), progress)
+            print(f"{share * whole_s:6.1f} s {time.monotonic() - progress.moment:6.2f} s", flush=True)
 
 
 def objects(seed: int, density: float, score: Score) -> tuple[int, float]:

@@ -88,15 +88,36 @@ def _check_rails(track: Centerline, known: Mapping[int, RailLine]) -> None:
 
 def _say_cant(courses: Sequence[Course], lacking: Sequence[int], has_rails: bool, progress: Progress) -> None:
     """Say where the cant is unknown."""
-    without = ", ".join(str(one.track_id) for one in courses if not one.has_cant)
+    without = [one.track_id for one in courses if not one.has_cant and one.track_id not in lacking]
     if without and not has_rails:
         progress.warning("Without RAILS the cant is unknown: what is beside canted track is not judged surely.")
     elif without:
         progress.warning(
-            f"Tracks {without} of INPUT state no rails in left_ids and right_ids that RAILS has: their cant is unknown."
+            f"INPUT has no left_ids and right_ids for {_named(without)}, whose cant is unknown: take the centerlines "
+            "from Extract Rails."
         )
     if lacking:
-        progress.warning(f"RAILS lacks rails of tracks {', '.join(map(str, lacking))}: give all rails of the run.")
+        progress.warning(f"RAILS lacks rails of {_named(lacking)}, whose cant is unknown: give all rails of the run.")
+
+
+def _named(track_ids: Sequence[int]) -> str:
+    """Name tracks, for messages."""
+    return f"track{'s' if len(track_ids) > 1 else ''} {', '.join(map(str, track_ids))}"
+
+
+def read_steps(values: Values, progress: Progress) -> Mapping[int, np.ndarray]:
+    """Read from QUALITY how far strips are apart: chainages and millimetres by track, (n, 2), where several show it."""
+    rows, fields = values.rows("QUALITY", progress)
+    missing = [name for name in ("track_id", "chainage_m", "strip_mm") if name not in fields]
+    if missing:
+        raise ParameterError(
+            f"QUALITY has no field {missing[0]}: take the points of Extract Rails or Measure Track Geometry."
+        )
+    steps: dict[int, list[tuple[float, float]]] = {}
+    for row in rows:
+        if row["strip_mm"] is not None:
+            steps.setdefault(int(row["track_id"]), []).append((float(row["chainage_m"]), float(row["strip_mm"])))
+    return {track_id: np.array(sorted(own)) for track_id, own in sorted(steps.items())}
 
 
 def read_profile(values: Values) -> Profile:

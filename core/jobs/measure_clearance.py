@@ -27,7 +27,7 @@ from .declaration import (
 from .values import Job, class_numbers
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     import numpy as np
 
@@ -51,6 +51,10 @@ READING = 0.05
 HEIGHTS_OFF_M = 20.0
 """A cloud whose middle is further above or below the tracks has other heights: within ten metres of a track, its points
 are on the ground or on what stands there."""
+
+
+BED_SHARE = 0.01
+"""Share of the points beside a track that are within a metre of its height, at least: its bed and its rails are."""
 
 
 def _check(values: Values) -> None:
@@ -79,9 +83,9 @@ def _run(values: Values, progress: Progress) -> Result:
     from ..clearance.measure import measure
     from ..clearance.settings import Settings
     from ..clearance.sweep import EVERY_CLASS
-    from ..report.clearance_remarks import remarks
+    from ..report.clearance_remarks import remarks, step_remarks
     from ..report.clearance_slices import slices
-    from .clearance_inputs import read_courses, read_profile
+    from .clearance_inputs import read_courses, read_profile, read_steps
 
     progress = Recording(progress)
     profile, request = read_profile(values), values.request(EVERY_CLASS, progress, name="POINTS")
@@ -99,9 +103,10 @@ def _run(values: Values, progress: Progress) -> Result:
         axes = values.axes(values.cloud_crs("POINTS")) if values.has_axis() else None
         found = found if axes is None else _placed(found, axes, progress)
         worst = tuple(slices(found))
-    for sentence in remarks(found):
+    steps = read_steps(values, progress) if values.filled("QUALITY") else None
+    for sentence in (*remarks(found), *step_remarks(found, steps or {})):
         progress.warning(sentence)
-    return _result(replace(found, warnings=progress.warnings), worst, axes, values)
+    return _result(replace(found, warnings=progress.warnings), worst, axes, _step_words(steps), values)
 
 
 def _check_cloud(found: Clearance, progress: Progress) -> None:
@@ -112,7 +117,8 @@ def _check_cloud(found: Clearance, progress: Progress) -> None:
     if not found.point_count:
         raise RailExtractError("POINTS has no point beside a track: check the coordinate systems.")
     above_m = float(np.median([*swept.heights.elements()]))
-    if abs(above_m) > HEIGHTS_OFF_M:
+    on_bed = sum(swept.heights[height] for height in (-1, 0, 1)) / sum(swept.heights.values())
+    if abs(above_m) > HEIGHTS_OFF_M or (abs(above_m) > 1 and on_bed < BED_SHARE):
         where = "above" if above_m > 0 else "below"
         raise RailExtractError(
             f"The cloud lies {abs(above_m):.0f} m {where} the tracks: are these ellipsoidal against levelled "
@@ -141,7 +147,15 @@ def _placed(found: Clearance, axes: PlacedAxes, progress: Progress) -> Clearance
     return replace(found, intrusions=tuple(intrusions), stations=tuple(stations))
 
 
-def _result(found: Clearance, worst: Sequence[Slice], axes: PlacedAxes | None, values: Values) -> Result:
+def _step_words(steps: Mapping[int, np.ndarray] | None) -> str:
+    """Return in words how far strips are apart, given chainages and millimetres by track; None if that is not known."""
+    if steps is None:
+        return "unknown: QUALITY was not given"
+    most_mm = max((float(own[:, 1].max()) for own in steps.values()), default=0.0)
+    return f"up to {most_mm:.1f} mm" if steps else "none: no place is shown by several strips"
+
+
+def _result(found: Clearance, worst: Sequence[Slice], axes: PlacedAxes | None, steps: str, values: Values) -> Result:
     """Return the result."""
     import numpy as np
 
@@ -162,7 +176,11 @@ def _result(found: Clearance, worst: Sequence[Slice], axes: PlacedAxes | None, v
         figures,
         found.frame,
         clearance_makers(found, axes),
-        {"REPORT": lambda: clearance_page(found, worst, source, {"Command": values.command})},
+        {
+            "REPORT": lambda: clearance_page(
+                found, worst, source, {"Steps between strips": steps, "Command": values.command}
+            )
+        },
         tuple(summary(found)),
         ShownCloud("POINTS", tuple(range(256)), 0.07),
         found=found,
@@ -205,6 +223,16 @@ JOB = Job(
             "is not judged surely.",
             optional=True,
             transformed=True,
+        ),
+        LayerInput(
+            "QUALITY",
+            "Track geometry",
+            "Points of Extract Rails or Measure Track Geometry for these tracks: the report states how far the strips "
+            "of the survey are apart.",
+            advanced=True,
+            optional=True,
+            transformed=True,
+            kinds=(POINT,),
         ),
         Choice(
             "PROFILE",

@@ -84,6 +84,8 @@ def verdict(found: Clearance) -> tuple[str, str]:
     if reasons:
         return "poor", "Cannot be judged."
     doubtful = [one for one in found.intrusions if not one.what]
+    if not np.isfinite(found.least_margin_m):
+        return "good", "Free. Nothing stands within reach."
     least = figure(1000 * found.least_margin_m, ".0f")
     if doubtful:
         return "fair", f"Free, with {counted(len(doubtful), 'place')} in doubt. The least margin is {least}."

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from ..clearance.intrusions import VEHICLE_WORDS
@@ -25,7 +27,7 @@ def cannot_be_judged(found: Clearance) -> list[str]:
     reasons = []
     canted = [one.track_id for one in found.courses if not one.has_cant and one.cant_sigma_m > CANTED_M]
     if canted:
-        reasons.append(f"RAILS are missing for canted tracks: {', '.join(map(str, canted))}.")
+        reasons.append(f"RAILS has no rails of canted tracks: {', '.join(map(str, canted))}.")
     total = sum(len(one.s) for one in found.stations)
     unseen = sum(int(found.unseen(one).sum()) for one in found.stations)
     if unseen > UNSEEN_SHARE * total:
@@ -73,6 +75,22 @@ def remarks(found: Clearance) -> list[str]:
         said.append(
             f"{counted(len(near), 'intrusion')} within {metres(NEAR_END_M)} of the end of a line: vehicles beyond are "
             "not swept."
+        )
+    return said
+
+
+def step_remarks(found: Clearance, steps: Mapping[int, np.ndarray]) -> list[str]:
+    """Return sentences on how far strips are apart, given chainages and millimetres, (n, 2), by track."""
+    said = []
+    for course in (one for one in found.courses if one.track_id in steps):
+        own = steps[course.track_id]
+        chainage_m, most_mm = own[np.argmax(own[:, 1])]
+        deep = [one for one in found.sure if one.track_id == course.track_id]
+        less = sum(one.pen_mm < np.interp(one.chainage_m, *own.T) for one in deep)
+        shallow = f" {counted(less, 'place')} inside the profile: less deep than the strips are apart there."
+        said.append(
+            f"The strips of the survey are up to {most_mm:.1f} mm apart on track {course.track_id}, at "
+            f"{chainage_m:,.0f} m; the standard errors do not hold this.{shallow if less else ''}"
         )
     return said
 

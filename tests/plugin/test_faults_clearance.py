@@ -73,6 +73,7 @@ FAULTS = {
         "rails of another run": given(RAILS=rails(shift_m=0.2)),
         "tracks of another place": given(shift=(0.0, 5000.0, 0.0)),
         "cloud with other heights": given(shift=(0.0, 0.0, -46.0)),
+        "cloud with heights from the ground": given(shift=(0.0, 0.0, -5.0)),
         "class that the cloud lacks": given(CLASSES_OUT="5"),
         "classes in words": given(CLASSES_OUT="trees"),
         "cloud of rail points": given(class_code=10),

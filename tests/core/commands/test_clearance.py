@@ -78,6 +78,36 @@ def test_kilometres_are_those_of_the_axis(place, tmp_path):
     assert row["pen_mm"] == pytest.approx(50, abs=4)
 
 
+def quality(path, fields=("track_id", "chainage_m", "strip_mm")):
+    """Write stations whose strips are apart by 2 mm, and by 60 mm at the plate, 20 m from the start."""
+    chainage_m = np.arange(0.0, 61.0, 10.0)
+    values = {"track_id": np.ones(7, int), "chainage_m": chainage_m, "strip_mm": np.where(chainage_m == 20, 60.0, 2.0)}
+    points = np.array([shapely.to_wkb(shapely.Point(*ORIGIN[:2]))] * 7, object)
+    columns = [values[name] for name in fields]
+    pyogrio.raw.write(
+        str(path),
+        driver="GPKG",
+        geometry_type="Point",
+        crs="EPSG:25832",
+        geometry=points,
+        field_data=columns,
+        fields=fields,
+    )
+    return path
+
+
+def test_the_steps_between_strips_are_stated(place, tmp_path, capsys):
+    given = ("--quality", quality(tmp_path / "quality.gpkg"), "--report", tmp_path / "page.html")
+    clearance(place, tmp_path / "out.gpkg", *given)
+    said = "The strips of the survey are up to 60.0 mm apart on track 1, at 20 m; the standard errors do not hold this."
+    less = "1 place inside the profile: less deep than the strips are apart there."
+    assert f"{said} {less}" in capsys.readouterr().err
+    page = (tmp_path / "page.html").read_text(encoding="utf-8")
+    assert said in page and "up to 60.0 mm" in page
+    clearance(place, tmp_path / "out.gpkg", "--quality", quality(tmp_path / "none.gpkg", ("track_id", "chainage_m")))
+    assert "--quality has no field strip_mm: take the points of Extract Rails" in capsys.readouterr().err
+
+
 def test_a_drawn_polygon_is_a_profile(place, tmp_path):
     _, (row,) = clearance(place, tmp_path / "out.gpkg", "--profile", "CUSTOM", "--profile-file", place / "box.gpkg")
     assert row["pen_mm"] == pytest.approx(105, abs=4)

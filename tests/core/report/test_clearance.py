@@ -45,6 +45,10 @@ def test_free(measured):
     assert 80 < 1000 * found.least_margin_m < 100
 
 
+def test_nothing_beside_the_track(measured):
+    assert verdict(measured(-1.8)) == ("good", "Free. Nothing stands within reach.")
+
+
 def test_too_few_points(measured):
     assert verdict(measured(-0.100, bed=False)) == ("poor", "Cannot be judged.")
 
