@@ -84,7 +84,7 @@ ROUNDS, LEAST_OFF_M = 12, 0.002
 """Rounds of reweighting, by which a fit no longer moves, and the deviation below which heights weigh the same."""
 
 GRADIENT = 0.04
-"""Gradient that is expected, plus or minus: a place without others along its rail shows none."""
+"""Steepest gradient of railways, which is expected, plus or minus, where a place has no others along its rail."""
 
 MIN_AGREE, AGREE_M = 0.5, 0.02
 """Share of the places along the rail that must agree on its height, and how far off they may be."""

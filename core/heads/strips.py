@@ -14,6 +14,7 @@ from scipy import sparse
 from scipy.ndimage import maximum_filter1d, minimum_filter1d, uniform_filter1d
 from scipy.sparse.linalg import spsolve
 
+from ..lines.smoothing import PROFILE_SIGMA_M
 from ..parameters import Parameters
 from ..polyline import Polyline, distance_to, interpolate, project
 from ..rails import HALF_TRACK_M, Centerline, StripCourse, Support
@@ -28,9 +29,6 @@ edges are looked for."""
 
 MIN_IN_STEP = 5
 """Points on top of the head that show a strip at a station; fewer may be stray points."""
-
-PROFILE_SIGMA_M = 1.0
-"""Sigma of PAEK for the heights of a strip."""
 
 OBSERVED_M = 0.002
 """Standard error of the position of one strip at a station, across and in height."""

@@ -6,7 +6,7 @@ QGIS reads layers itself, the command line and Python with pyogrio and shapely; 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -105,24 +105,22 @@ class FeatureSource(ABC):
 def read_lines(source: FeatureSource, progress: Progress) -> LayerLines:
     """Read all parts of all lines that have a length, in one local frame."""
     system = system_of(source.crs_wkt, progress)
-    parts = (
-        (feature.number, feature.row, moving)
-        for feature in progress.follow(source.features(source.crs_wkt), source.count)
-        for moving in map(_moving, feature.of_kind(LINE))
-        if len(moving) > 1
-    )
+    parts = _moving_lines(progress.follow(source.features(source.crs_wkt), source.count))
     return LayerLines.of(source.name, parts, source.fields, system, progress)
 
 
 def read_lines_in(source: FeatureSource, crs_wkt: str | None, progress: Progress) -> LayerLines:
     """Read the same lines in another coordinate system; errors as for `read_lines`, or they can't be transformed."""
-    parts = (
-        (feature.number, feature.row, moving)
-        for feature in _placed(source, crs_wkt)
-        for moving in map(_moving, feature.of_kind(LINE))
-        if len(moving) > 1
-    )
+    parts = _moving_lines(_placed(source, crs_wkt))
     return LayerLines.of(source.name, parts, source.fields, system_of(crs_wkt or source.crs_wkt, progress), progress)
+
+
+def _moving_lines(features: Iterable[Feature]) -> Iterator[tuple[int, Row, np.ndarray]]:
+    """Yield number and values of features, and the vertices, (n, 3), of each of their lines that has a length."""
+    for feature in features:
+        for moving in map(_moving, feature.of_kind(LINE)):
+            if len(moving) > 1:
+                yield feature.number, feature.row, moving
 
 
 def read_rows(source: FeatureSource, progress: Progress) -> Rows:

@@ -19,6 +19,7 @@ from ..classify.pieces import links, long_enough, shares_of_length
 from ..classify.settings import DENSE, THIN, Settings
 from ..classify.square import Classified, beside_guide, classify_square
 from ..classify.tops import Grid
+from ..clouds.on_heads import GRADIENT
 from ..progress import SILENT, Progress
 from ..rails import SearchFigures
 from .blocks import RAIL_VOXEL_M, Thinned, cut, thin
@@ -36,9 +37,6 @@ NEAREST_M = 0.001
 
 LEVEL_M = 1.0
 """Labelled points this far apart in height may be on one line: on the decks of bridges and below them they are not."""
-
-GRADIENT = 0.04
-"""Steepest gradient of railways: by how much the top of a rail rises along it."""
 
 
 def label_square(

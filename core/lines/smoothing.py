@@ -141,6 +141,10 @@ def _shifted(moments: np.ndarray, powers: Sequence[np.ndarray], decay: np.ndarra
 STATIONS_PER_SIGMA = 4
 """A smoothed line has no detail shorter than sigma; stations a quarter of it apart show its shape."""
 
+PROFILE_SIGMA_M = 1.0
+"""Sigma for the heights of strips, and for gauge, cant and heights of a track: a twist over 3 m keeps nearly its full
+size."""
+
 GAP_SIGMAS = 3.0
 """A profile is not smoothed across a gap between its points that is longer than this many sigma."""
 

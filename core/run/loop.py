@@ -26,7 +26,7 @@ Name = TypeVar("Name", bound=Hashable)
 Message = TypeVar("Message")
 
 CHECK_EVERY_S = 0.1
-"""Interval at which cancellation is checked while others compute."""
+"""Interval at which cancellation is checked while others compute, and least time between two reports of a fraction."""
 
 NOTES = "__notes__"
 """What Python 3.11 and newer write below a traceback: here, that of the worker process, which is not sent itself."""

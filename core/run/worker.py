@@ -20,7 +20,7 @@ from queue import SimpleQueue
 from typing import Any, Callable
 
 from ..kernels import ENVIRONMENT
-from .loop import Answer, Heard
+from .loop import CHECK_EVERY_S, Answer, Heard
 from .tasks import Context, Once, Task
 
 PROGRAM = "import sys; sys.path[:] = sys.argv[1:]; from {} import serve; serve()"
@@ -28,9 +28,6 @@ PROGRAM = "import sys; sys.path[:] = sys.argv[1:]; from {} import serve; serve()
 
 NO_WINDOW = getattr(subprocess, "CREATE_NO_WINDOW", 0)
 """On Windows, a console would open for each process."""
-
-REPORT_EVERY_S = 0.1
-"""Least time between two reports of the fraction that is done, and interval at which cancellation is checked."""
 
 
 class Kind(IntEnum):
@@ -160,7 +157,7 @@ class _Reported(Heard):
 
     def set_fraction(self, fraction: float) -> None:
         now = time.monotonic()
-        if now - self._sent >= REPORT_EVERY_S:
+        if now - self._sent >= CHECK_EVERY_S:
             self._sent = now
             self._send(Kind.FRACTION, fraction)
 

@@ -11,14 +11,13 @@ import numpy as np
 from ..heads.elevation import measure_again
 from ..heads.head_points import Widths
 from ..lines.finishing import united
-from ..lines.smoothing import GAP_SIGMAS
+from ..lines.smoothing import GAP_SIGMAS, PROFILE_SIGMA_M
 from ..polyline import runs
 from ..progress import SILENT, Progress
 from ..rails import RailLine
 from ..run.loop import Runner
 from ..run.tasks import Context, Task
 from ..tiles.grid import Key, PointSource, Square, Tiling, drawn_from, lay_out
-from ..tracks.geometry import PROFILE_SIGMA_M
 
 CONTEXT_M = 10.0
 """Distance beyond a square over which its rails are measured as well: the disc reaches 1 m, and what is further away

@@ -125,41 +125,22 @@ def drawn_from(rail: RailLine, source: PointSource) -> bool:
     return rail.class_code == source.class_code and rail.fills == source.fills
 
 
-@dataclass(frozen=True)
+@dataclass
 class Filling:
     """Blunt points of a cloud that has sharp ones as well: they show rails only where no `lines` are, a `PointSource`.
 
-    Lines, (k, 2) or (k, 3) each in the frame of the cloud, are those that the sharp points have shown.
+    Lines, (k, 2) or (k, 3) each in the frame of the cloud, are those that the sharp points have shown; the points
+    beside them count among those of the squares.
     """
 
     source: PointSource
     lines: tuple[np.ndarray, ...] = ()
     fills = True
 
-    @property
-    def frame(self) -> LocalFrame:
-        """See `PointSource`."""
-        return self.source.frame
-
-    @property
-    def class_code(self) -> int:
-        """See `PointSource`."""
-        return self.source.class_code
-
-    @property
-    def side_m(self) -> float:
-        """See `PointSource`."""
-        return self.source.side_m
-
-    @property
-    def counts(self) -> Mapping[Key, int]:
-        """See `PointSource`; with the points beside lines."""
-        return self.source.counts
-
-    @property
-    def span_m(self) -> float:
-        """See `PointSource`."""
-        return self.source.span_m
+    def __post_init__(self) -> None:
+        source = self.source
+        self.frame, self.class_code, self.side_m = source.frame, source.class_code, source.side_m
+        self.counts, self.span_m = source.counts, source.span_m
 
     def near(self, square: Square, margin_m: float) -> RailPoints:
         """See `PointSource`."""

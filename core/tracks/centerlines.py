@@ -23,7 +23,7 @@ from ..polyline import MIN_RING_M, Polyline
 from ..progress import SILENT, Progress
 from ..rails import Centerline, RailLine
 from ..standards import distinct_gauges
-from .chaining import PROVISIONAL_STEP_M, TrackChain, chain_pairs, provisional_centerline, runs_on, single_rail_limit
+from .chaining import MEETING_STEP_M, TrackChain, chain_pairs, provisional_centerline, runs_on, single_rail_limit
 from .midline import (
     MAX_OFFSET_M,
     Side,
@@ -32,9 +32,7 @@ from .midline import (
     midway,
 )
 from .pairing import pair_rails, refuse_other_spacing
-
-STATION_M = 0.5
-"""Spacing of the stations that are searched for the track that an end may have left."""
+from .parallels import SAMPLE_STEP_M
 
 MAX_APART_M = 0.3
 """Largest distance of the end of a branch from the track that it left: rails are separate when heads and flangeway are
@@ -108,13 +106,13 @@ def _near_ends(lines: Sequence[Centerline]) -> Iterator[tuple[int, int, int]]:
     """Yield the ends near another line: number of the line, 0 or -1 for its end, and number of the nearest line."""
     if len(lines) < 2:
         return
-    stations_of = [line.line.resampled(STATION_M).xy for line in lines]
+    stations_of = [line.line.resampled(SAMPLE_STEP_M).xy for line in lines]
     number = np.repeat(np.arange(len(lines)), [len(one) for one in stations_of])
     stations = np.concatenate(stations_of)
     tree = cKDTree(stations)
     for line, end in ((line, end) for line in range(len(lines)) for end in (0, -1)):
         place = lines[line].xyz[end, :2]
-        near = [other for other in tree.query_ball_point(place, MAX_APART_M + STATION_M) if number[other] != line]
+        near = [other for other in tree.query_ball_point(place, MAX_APART_M + SAMPLE_STEP_M) if number[other] != line]
         if near:
             yield line, end, int(number[min(near, key=lambda other: np.hypot(*(stations[other] - place)))])
 
@@ -279,7 +277,7 @@ def _draw(rails: Sequence[RailLine], chain: TrackChain, parameters: Parameters) 
     spacing_m = parameters.gauge_m + parameters.head_width_m
     reach_m, tolerance_m = single_rail_limit(parameters.max_gap_m), parameters.centerline_tolerance_m
     provisional = Polyline(provisional_centerline(rails, chain, spacing_m / 2, reach_m))
-    drawn = Polyline(provisional.resampled(PROVISIONAL_STEP_M).xyz)
+    drawn = Polyline(provisional.resampled(MEETING_STEP_M).xyz)
     stations, normals = drawn.xyz, drawn.normals
     spans = (
         _spans((pair.left, pair.left_span) for pair in chain.pairs),

@@ -255,8 +255,9 @@ def runs_on(span: tuple[float, float], following: tuple[float, float]) -> bool:
     return sense * (following[1] - following[0]) > 0 and sense * (following[1] - span[1]) > 0
 
 
-PROVISIONAL_STEP_M = 0.25
-"""Spacing of the vertices: in a tram curve of 25 m the chords deviate by 0.3 mm."""
+MEETING_STEP_M = 0.25
+"""Spacing of the stations at which both rails are met, and of the vertices of the provisional line: in a tram curve of
+25 m the chords deviate by 0.3 mm."""
 
 
 def provisional_centerline(rails: Sequence[RailLine], chain: TrackChain, half_m: float, reach_m: float) -> np.ndarray:
@@ -314,7 +315,7 @@ def _longer(left: RailAhead, right: RailAhead, half_m: float, reach_m: float) ->
 
 def _followed(ahead: RailAhead, left_m: float, length_m: float) -> np.ndarray:
     """Follow a rail outwards at an offset to its left; nothing is drawn over less than a step."""
-    return ahead.at(_steps(0.0, length_m), left_m) if length_m > PROVISIONAL_STEP_M else np.empty((0, 2))
+    return ahead.at(_steps(0.0, length_m), left_m) if length_m > MEETING_STEP_M else np.empty((0, 2))
 
 
 def _middle(left: RailAhead, right: RailAhead) -> np.ndarray:
@@ -324,4 +325,4 @@ def _middle(left: RailAhead, right: RailAhead) -> np.ndarray:
 
 def _steps(start: float, end: float) -> np.ndarray:
     """Return at least three distances from the start to the end."""
-    return np.linspace(start, end, max(int(np.ceil(abs(end - start) / PROVISIONAL_STEP_M)), 2) + 1)
+    return np.linspace(start, end, max(int(np.ceil(abs(end - start) / MEETING_STEP_M)), 2) + 1)

@@ -10,19 +10,14 @@ from functools import cached_property
 
 import numpy as np
 
-from ..lines.smoothing import smooth_line, smooth_profile
+from ..lines.smoothing import PROFILE_SIGMA_M, smooth_line, smooth_profile
 from ..polyline import Polyline, distance_to
 from ..progress import SILENT, Progress
 from ..rails import Centerline, RailLine, TrackGeometry, cell_borders
 from ..standards import Gauge, width_at
+from .chaining import MEETING_STEP_M
 from .midline import Meeting, Side, bridged_steps
 from .parallels import most_common_spacing
-
-MEETING_STEP_M = 0.25
-"""Spacing of the stations at which both rails are met."""
-
-PROFILE_SIGMA_M = 1.0
-"""Sigma of PAEK for gauge, cant and heights: a twist over 3 m keeps nearly its full size."""
 
 MAX_EXTRAPOLATION_M = 1.5
 """Distance from the nearest place with both rails up to which gauge and cant are given: half the base of a twist."""

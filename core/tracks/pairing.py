@@ -18,7 +18,7 @@ from ..progress import SILENT, Progress
 from ..rails import RailLine
 from ..standards import closest_standard
 from .dtw import match_polylines
-from .parallels import MAX_SPACING_M, Parallels, find_parallels, most_common_spacing
+from .parallels import MAX_SPACING_M, SAMPLE_STEP_M, Parallels, find_parallels, most_common_spacing
 
 MIN_SECTION_M = 3.0
 """Shorter sections at gauge occur by chance in a switch."""
@@ -31,9 +31,6 @@ CHUNK_M = 1000.0
 
 MARGIN_M = 1.0
 """Length added to a section found at stations, so that the exact matching finds its ends."""
-
-COARSE_STEP_M = 0.5
-"""Spacing of the matched stations; in a tram curve of 25 m their chords deviate by 1 mm."""
 
 FINE_STEP_M = 0.025
 """Spacing of the stations where rails enter or leave the tolerance: the resolution of the ends of a match."""
@@ -190,7 +187,7 @@ def _on_one_level(a: RailLine, b: RailLine, t_a: np.ndarray, t_b: np.ndarray) ->
 
 def _offset_curve(rail: Polyline, t: np.ndarray, left_m: float) -> Polyline:
     """Move the part of a rail around the chainages `t` to the left by `left_m`; it keeps the chainages of the rail."""
-    part = rail.resampled(COARSE_STEP_M, t.min() - MARGIN_M, t.max() + MARGIN_M)
+    part = rail.resampled(SAMPLE_STEP_M, t.min() - MARGIN_M, t.max() + MARGIN_M)
     return Polyline(part.xy + left_m * part.normals, part.t)
 
 
@@ -203,7 +200,7 @@ def _abreast(a: Polyline, b: Polyline, tolerance_m: float) -> Iterator[tuple[np.
     near = np.zeros(len(a.t), dtype=bool)
     near[b.feet(a.xy, tolerance_m).point] = True
     changes = np.flatnonzero(np.diff(near))
-    share = np.arange(FINE_STEP_M / COARSE_STEP_M, 1.0, FINE_STEP_M / COARSE_STEP_M)
+    share = np.arange(FINE_STEP_M / SAMPLE_STEP_M, 1.0, FINE_STEP_M / SAMPLE_STEP_M)
     stations = np.sort(np.append(a.t, a.t[changes, None] + share * np.diff(a.t)[changes, None]))
     feet = b.feet(a.at(stations), tolerance_m)
     order = np.argsort(feet.point)
@@ -247,7 +244,7 @@ def _misfit_m(rails: Sequence[RailLine], match: _Match, spacing: float) -> tuple
     """Return how unlike two rails of a track the rails of a match are: off the gauge, and wandering (weighted)."""
     a, b = rails[match.a].line, rails[match.b].line
     start, end = np.sort(match.t_a[[0, -1]]).tolist()
-    t = np.arange(start, end, COARSE_STEP_M)
+    t = np.arange(start, end, SAMPLE_STEP_M)
     places = a.at(t)
     # Of a long rail only the part of this match: many matches of one rail must not cost the square of its length.
     first, after = np.searchsorted(b.t, [match.t_b.min() - MARGIN_M, match.t_b.max() + MARGIN_M])
