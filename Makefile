@@ -13,6 +13,10 @@ AS_PACKAGE = .check/src
 ENVIRONMENT = build/environment.sh
 # On all cores; tests of a file share what they made.
 BY_FILE = -n auto --dist loadfile
+# The walk through the whole and what runs it: `make check` tests it with the newest numpy, and tests of the plugin, of
+# qgis_process and of the golden table run it with QGIS's packages.
+WALK = $(addprefix --ignore=tests/core/,pipeline run jobs commands squares test_package.py)
+TRAINING = tests/core/commands/test_train_classifier.py
 
 # A new system has no list of packages yet.
 INSTALL = exec >&2; $(SUDO) apt-get update -q && \
@@ -34,7 +38,7 @@ check: lint  ## lint, types, import rules and the tests that need neither QGIS n
 
 .PHONY: test
 test: check plugin  ## run every test: check, core with PyTorch, plugin and, through qgis_process, the whole
-	@. ./$(ENVIRONMENT) && $(PYTHON) -m pytest -n auto tests/core tests/laboratory tests/benchmarks
+	@. ./$(ENVIRONMENT) && $(PYTHON) -m pytest -n auto $(WALK) tests/core $(TRAINING) tests/laboratory tests/benchmarks
 	@. ./$(ENVIRONMENT) && $(PYTHON) -m pytest $(BY_FILE) tests/plugin tests/e2e
 
 .PHONY: test-desktop

@@ -20,11 +20,7 @@ from rail_extract.core.files.writing import write_layers
 from rail_extract.core.frame import LocalFrame
 from rail_extract.laboratory.scenes import clearance
 from rail_extract.laboratory.scenes.las import write_las
-from rail_extract.laboratory.scenes.raw import scan_world
-from rail_extract.laboratory.scenes.raw_catalogue import BLUNT, STANDARD, line, parallel
 from rail_extract.laboratory.scenes.raw_strips import strip
-from rail_extract.laboratory.scenes.raw_world import ground, running_rails
-from rail_extract.laboratory.scenes.write import write_raw
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
@@ -90,15 +86,6 @@ def _written(path: Path, length_m: float, rail_class: int) -> Path:
 
 
 @pytest.fixture(scope="session")
-def blunt_cloud(tmp_path_factory):
-    """A raw cloud of 24 m of track from blurred images, whose heads look wider than any."""
-    path = tmp_path_factory.mktemp("clouds") / "blunt.las"
-    track = parallel(line(24.0, 0.0, 0.35), (0.0,))
-    write_raw(scan_world("blunt", track, STANDARD, [BLUNT], [ground, running_rails], 1), path)
-    return path
-
-
-@pytest.fixture(scope="session")
 def gauge_folder(tmp_path_factory):
     """A folder with a cloud, `cloud.las`, of 90 m of curve with two plates in EBO_G1, and its lines, `lines.gpkg`."""
     folder = tmp_path_factory.mktemp("gauge")
@@ -115,7 +102,7 @@ def gauge_folder(tmp_path_factory):
 
 
 @pytest.fixture(scope="session")
-def run_scenario(tmp_path_factory, raw_cloud, blunt_cloud, labelled_cloud, gauge_folder):
+def run_scenario(tmp_path_factory, raw_cloud, labelled_cloud, gauge_folder):
     """Run a scenario, once: tests share what it found. One that goes on has the profile of another one."""
     programs = {name: shutil.which(name) for name in ("qgis", "xvfb-run")}
     if not all(programs.values()) or "QGIS_PROCESS" not in os.environ:
@@ -135,7 +122,6 @@ def run_scenario(tmp_path_factory, raw_cloud, blunt_cloud, labelled_cloud, gauge
             "TMPDIR": str(temporary),
             "RAIL_EXTRACT_SAMPLE": str(ROOT / "resources" / "sample" / "sample.laz"),
             "RAIL_EXTRACT_RAW": str(raw_cloud),
-            "RAIL_EXTRACT_BLUNT": str(blunt_cloud),
             "RAIL_EXTRACT_LABELLED": str(labelled_cloud),
             "RAIL_EXTRACT_GAUGE": str(gauge_folder),
             "RAIL_EXTRACT_ZIP": str(ROOT / "build" / "rail_extract.zip"),

@@ -9,12 +9,10 @@ from collections.abc import Iterable, Iterator
 from functools import partial
 from pathlib import Path
 
-import processing
 from driver import Driver, algorithm, choose, close, install, later, open_batch, open_dialog, press_run, window
 from qgis.core import (
     QgsApplication,
     QgsCoordinateReferenceSystem,
-    QgsExpression,
     QgsLayerTree,
     QgsPointCloudLayer,
     QgsPointXY,
@@ -49,8 +47,8 @@ from qgis.PyQt.QtWidgets import (
 )
 from qgis.utils import iface, loadPlugin, plugins, reloadPlugin, startPlugin, unloadPlugin
 
-RAW, BLUNT, LABELLED, GAUGE, SAMPLE, ARCHIVE = (
-    os.environ[f"RAIL_EXTRACT_{name}"] for name in ("RAW", "BLUNT", "LABELLED", "GAUGE", "SAMPLE", "ZIP")
+RAW, LABELLED, GAUGE, SAMPLE, ARCHIVE = (
+    os.environ[f"RAIL_EXTRACT_{name}"] for name in ("RAW", "LABELLED", "GAUGE", "SAMPLE", "ZIP")
 )
 PART = {
     "STANDARD": "IN_75R_1000",
@@ -87,7 +85,7 @@ class Browser(QObject):
 
 
 def dialogs(driver: Driver) -> Iterator:
-    """Open every dialog, turn the wheel over its fields, press its buttons, choose clouds, and run two of them."""
+    """Open every dialog, turn the wheel over its fields, press its buttons, choose clouds, and run one of them."""
     yield from install(ARCHIVE)
     browser, changed = Browser(), {}
     names = [one.name() for one in QgsApplication.processingRegistry().providerById("railextract").algorithms()]
@@ -110,10 +108,6 @@ def dialogs(driver: Driver) -> Iterator:
         driver.keep("dialogs", [*driver.results.get("dialogs", []), name])
     driver.keep("help", browser.urls)
     yield from _select_clouds(driver)
-    dialog = yield from open_dialog("checkinstallation")
-    driver.keep("check", (yield from press_run(dialog)))
-    driver.picture("check")
-    yield from close(dialog)
     yield from _wheel_elsewhere(driver, changed)
     yield from _run_or_not(driver)
 
@@ -324,9 +318,6 @@ def raw(driver: Driver) -> Iterator:
     driver.keep("systems", {layer.name(): layer.crs().toWkt() for layer in layers})
     driver.keep("bars", [item.text() for item in iface.messageBar().items()])
     yield from _save_all(driver, log)
-    dialog.setParameters({"INPUT": BLUNT, "CLASSIFY": True, "STANDARD": "DETECT"})
-    driver.keep("blunt", (yield from press_run(dialog)).rpartition("starting")[2])
-    driver.picture("raw_blunt")
     yield from close(dialog)
 
 
@@ -447,10 +438,6 @@ def onwards(driver: Driver) -> Iterator:
     export = yield lambda: next((one for one in _dialogs() if one.algorithm().name() == "exportalignment"), None)
     elements = QgsProject.instance().mapLayer(export.mainWidget().wrappers["INPUT"].parameterValue())
     driver.keep("exported", elements.name())
-    designs: dict[int, list[str]] = {}
-    for one in elements.getFeatures():
-        designs.setdefault(one["track_id"], []).append(f"{one['layout']} {one['type']}")
-    driver.keep("designs", list(designs.values()))
     driver.picture("onwards_export")
     yield from close(export)
     yield from close(dialog)
@@ -465,30 +452,6 @@ def onwards(driver: Driver) -> Iterator:
     driver.keep("colours", [one.symbol().color().name() for one in stationed.renderer().categories()])
     driver.keep("groups", _groups())
     driver.picture("onwards_stations")
-    yield from _compare_lifted(driver, layers["Rails"])
-
-
-def _compare_lifted(driver: Driver, rails: QgsVectorLayer) -> Iterator:
-    """Compare rails with a copy of them that lies 10 mm higher."""
-    lift = {"INPUT": rails, "DELTA_Z": 0.01, "OUTPUT": "memory:"}
-    lifted = QgsProject.instance().addMapLayer(processing.run("native:translategeometry", lift)["OUTPUT"])
-    dialog = yield from open_dialog("comparetracks")
-    dialog.setParameters({"REFERENCE": rails.id(), "INPUT": lifted.id()})
-    driver.keep("comparison", (yield from press_run(dialog)))
-    page = Path(dialog.results()["REPORT"]).read_text(encoding="utf-8")
-    driver.keep("compared", re.findall("<h2>(.*?)</h2>", page))
-    yield from close(dialog)
-    (differences,) = (one for one in QgsProject.instance().mapLayers().values() if one.name().startswith("Differences"))
-    iface.mapCanvas().setExtent(differences.extent())
-    yield 1.0
-    driver.picture("onwards_compared")
-    renderer = differences.renderer()
-    expression, context = QgsExpression(renderer.classAttribute()), differences.createExpressionContext()
-    drawn = set()
-    for row in differences.getFeatures():
-        context.setFeature(row)
-        drawn.add(expression.evaluate(context))
-    driver.keep("drawn", [one.label() for one in renderer.categories() if one.value() in drawn])
 
 
 def tried(driver: Driver) -> Iterator:
@@ -563,22 +526,6 @@ def _follow(log: QTextEdit, text: str) -> None:
     log.setTextCursor(found)
     found.setPosition(found.selectionStart() + 1)
     QTest.mouseClick(log.viewport(), Qt.MouseButton.LeftButton, pos=log.cursorRect(found).center())
-
-
-def rails(driver: Driver) -> Iterator:
-    """Extract the sample's rails and load all results."""
-    yield from install(ARCHIVE)
-    dialog = yield from open_dialog("extractrails")
-    dialog.mainWidget().wrappers["INPUT"].widget.combo.lineEdit().insert(SAMPLE)
-    outputs = dict.fromkeys(("RAILS", "CENTERLINES", "QUALITY", "FINDINGS", "REPORT"), "TEMPORARY_OUTPUT")
-    others = {"OTHER_GAUGES": "1435/72", "LEAVE_OUT": ["SYNTHETIC"], "CLEANED": str(driver.folder / "cleaned.tif")}
-    dialog.setParameters({**PART, **outputs, **others})
-    driver.keep("log", (yield from press_run(dialog)))
-    results = dialog.results()
-    driver.keep("results", results)
-    yield from close(dialog)
-    driver.keep("layers", [node.name() for node in QgsProject.instance().layerTreeRoot().findLayers()])
-    driver.picture("rails")
 
 
 def review(driver: Driver) -> Iterator:

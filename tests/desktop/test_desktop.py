@@ -4,16 +4,13 @@ import re
 from pathlib import Path
 
 import pytest
-from osgeo import gdal, ogr
+from osgeo import ogr
 
 SCENARIOS = (
-    *("dialogs", "unload", "raw", "missing", "rails", "welcome"),
+    *("dialogs", "unload", "raw", "missing", "welcome"),
     *("review", "reopened", "again", "tried", "onwards", "growing", "steps", "train", "batch", "model"),
     "clearance",
 )
-
-DIES_AT_EXIT = ("rails", 340)
-"""Scenario and version in which QGIS dies after it was closed, as it also does after two runs of its own algorithms."""
 
 NAMES = [
     *("extractrails", "classifyrailpoints", "growrailpoints", "airbornecenterlines"),
@@ -29,8 +26,7 @@ def test_no_error_and_no_crash(run_scenario, scenario):
     session = run_scenario(scenario)
     assert session["exceptions"] == []
     assert session["ended"]
-    if (scenario, session["version"] // 100) != DIES_AT_EXIT:
-        assert session.code == 0, session.said
+    assert session.code == 0, session.said
 
 
 def test_every_dialog_opens_and_its_help(run_scenario):
@@ -66,12 +62,6 @@ def test_cloud_is_selected_as_file_or_folder_or_typed(run_scenario):
     assert session["folders only"]
     assert Path(session["selected folder"]).name == "sample"
     assert session["typed path"] == "/data/typed.laz"
-
-
-def test_check_of_the_installation_shows_its_result(run_scenario):
-    log = run_scenario("dialogs")["check"]
-    assert "Rail Extract works here. Self test passed: 100.0% of the true rails found" in log
-    assert "PASSED: True" in log.replace("'", "")  # newer QGIS writes no quotes
 
 
 def test_a_wheel_that_passes_over_fields_changes_nothing(run_scenario):
@@ -110,13 +100,6 @@ def test_a_raw_cloud_without_the_tick_is_explained_and_its_rails_are_found(run_s
     assert re.search(r"Detected .* head \d\d ± \d mm; fits .*, also ", found)
     assert "RAIL_COUNT: 2" in found.replace("'", "")
     assert "Review the findings" in found or "0 findings" in found
-
-
-def test_a_blunt_raw_cloud_is_searched_at_the_gauge_that_it_shows(run_scenario):
-    log = run_scenario("raw")["blunt"]
-    assert re.search(r"No standard has such heads: .* EN 60E1 \(UIC 60\), 1435 mm \(EN_60E1_1435\) is assumed", log)
-    assert "RAIL_COUNT: 2" in log.replace("'", "")
-    assert "Next: Run again as " in log
 
 
 def test_layers_of_a_cloud_without_a_system_have_none(run_scenario):
@@ -173,19 +156,6 @@ def test_missing_pytorch_leads_to_its_installation(run_scenario):
     assert "run Install packages, with PyTorch set to CPU" in session["message"]
     assert (session["opened"], session["PyTorch"]) == ("installpackages", "CPU")
     assert session["message is closed"]
-
-
-def test_rails_are_found_and_loaded(run_scenario):
-    session = run_scenario("rails")
-    assert session["results"]["RAIL_COUNT"] == 6
-    assert session["results"]["CENTERLINE_COUNT"] == 3
-    titles = ("Findings", "Track centerlines", "Rails", "Track geometry")
-    assert session["layers"] == [*(f"{title}: sample" for title in titles), "cleaned"]
-
-
-def test_saved_raster_has_its_system(run_scenario):
-    dataset = gdal.Open(str(run_scenario("rails").folder / "cleaned.tif"))
-    assert dataset.GetSpatialRef().GetAuthorityCode(None) == "32643"
 
 
 def test_the_menu_opens_the_sample(run_scenario):
@@ -337,26 +307,10 @@ def test_the_next_step_after_a_fit_exports_its_elements(run_scenario):
     assert session["exported"] == "Elements: sample"
 
 
-def test_three_tracks_of_one_design_have_the_same_elements(run_scenario):
-    session = run_scenario("onwards")
-    plan, cant = ["H line", "H clothoid", "H arc"], ["C constant", "C ramp", "C constant"]
-    assert session["designs"] == 3 * [[*plan, *4 * ["V parabola"], *cant]]
-
-
 def test_a_copy_with_kilometres_has_the_style_of_its_layer(run_scenario):
     session = run_scenario("onwards")
     assert session["aliases"] == ["In doubt [m]", "Kilometre"]
     assert "#d62839" in session["colours"]
-
-
-def test_a_lift_of_all_lines_is_in_the_headline_and_in_the_map(run_scenario):
-    session = run_scenario("onwards")
-    shift = (
-        "The later survey is shifted by +0.0 mm east, +0.0 mm north, +10.0 mm up; apart from that, nothing has moved"
-    )
-    assert shift in session["comparison"]
-    assert {"Rail 1 (left in track 1)", "Rail 2 (right in track 1)"} <= set(session["compared"])
-    assert session["drawn"] == ["shifted with all lines, not moved otherwise"]
 
 
 def test_model_takes_a_folder_and_runs(run_scenario):

@@ -80,11 +80,3 @@ def test_folder_of_packages_from_the_setting(bare, rasterize, tmp_path):
     with (bare.profile / "profiles" / "default" / "QGIS" / "QGIS3.ini").open("a") as settings:
         settings.write(f"\n[Processing]\nConfiguration\\RAIL_EXTRACT_PACKAGES={bare.packages}\n")
     assert rasterize()["OUTPUT"] == str(tmp_path / "raster.tif")
-
-
-def test_installation_is_checked(succeed):
-    results = succeed("checkinstallation", {})
-    assert results["SELF_TEST"].startswith("passed: 100.0%"), results
-    assert results["PASSED"] is True
-    assert results["MODELS"] == "base ok, fast ok"
-    assert "laspy 2" in results["VERSIONS"]

@@ -41,13 +41,6 @@ def fit(measured, fixed=None, progress=None, **settings):
     return fit_track(measured, FRAME, FitParameters(**settings), fixed, progress or Progress())
 
 
-def test_a_line_without_noise_gives_its_design_back():
-    found = fit(track(design(), white_m=0.0)).alignment
-    assert [one.type for one in found.plan] == ["line", "clothoid", "arc", "clothoid", "line"]
-    np.testing.assert_allclose([one.s_from for one in found.plan], [0, 120, 180, 330, 380], atol=0.002)
-    assert found.plan[2].k_from == pytest.approx(1 / 400, rel=1e-6)
-
-
 def test_the_reversed_track_gives_the_mirrored_elements():
     ahead = track(design(), seed=3)
     back = replace(ahead, xyz=ahead.xyz[::-1])
@@ -55,25 +48,6 @@ def test_the_reversed_track_gives_the_mirrored_elements():
     length = one.s_to
     np.testing.assert_allclose([x.s_from for x in one.plan], [length - x.s_to for x in other.plan[::-1]], atol=0.02)
     np.testing.assert_allclose([x.k_from for x in one.plan], [-x.k_to for x in other.plan[::-1]], atol=2e-7)
-
-
-@pytest.mark.parametrize("seed", [1, 2, 5])
-def test_short_waves_of_a_smoothed_line_are_not_taken_for_elements(seed):
-    smooth = surveyed(design(), np.random.default_rng(seed), 0.00003, 0.0004, 6.0)[::3]
-    found = fit(Track(1, smooth, NONE, np.zeros(len(smooth), dtype=bool))).alignment
-    assert len(found.plan) == len(SHAPES)
-    assert len(found.vertical) == 3
-
-
-@pytest.mark.parametrize("seed", [0, 3])
-def test_errors_of_a_smoothed_line_are_not_taken_for_elements(seed):
-    shapes = [(20.0, 0, 0), (90.0, 0, -1 / 1200), (60.0, -1 / 1200, -1 / 1200), (90.0, -1 / 1200, 0), (20.0, 0, 0)]
-    one = replace(design(shapes), vertical=(VerticalElement(0, 280, 50, 0.001, 0.001),))
-    smooth = surveyed(one, np.random.default_rng(seed), 0.00003, 0.0006, 12.0)[::3]
-    found = fit(Track(1, smooth, NONE, np.zeros(len(smooth), dtype=bool))).alignment
-    assert [x.type for x in found.plan] == ["line", "clothoid", "arc", "clothoid", "line"]
-    assert 1 / found.plan[2].k_from == pytest.approx(-1200, rel=0.005)
-    assert len(found.vertical) == 1
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -87,12 +61,6 @@ def test_cant_that_waves_by_less_than_a_survey_shows_has_the_elements_of_its_clo
     np.testing.assert_allclose([part.cant_from_m for part in found.cant], [0, 0, -0.08, -0.08, 0], atol=0.0006)
 
 
-def test_a_straight_stays_one_element():
-    straight = Alignment(1, FRAME, chained((0.0, 0.0), 1.0, [(400.0, 0, 0)]), (VerticalElement(0, 400, 0, 0, 0),))
-    counts = [len(fit(track(straight, seed, white_m=0.004)).alignment.plan) for seed in range(10)]
-    assert sum(count == 1 for count in counts) >= 9
-
-
 def test_turnouts_have_jumps_unless_clothoids_are_required():
     siding = design([(80.0, 0, 0), (60.0, 1 / 300, 1 / 300), (80.0, 0, 0), (60.0, -1 / 300, -1 / 300), (80.0, 0, 0)])
     found = fit(track(siding)).alignment
@@ -101,25 +69,6 @@ def test_turnouts_have_jumps_unless_clothoids_are_required():
     ]  # fmt: skip
     smooth = fit(track(siding), transitions="CLOTHOIDS").alignment
     assert {one.figures.joint for one in smooth.plan[1:]} == {"G2"}
-
-
-def test_vertices_may_be_uneven_and_dense():
-    random = np.random.default_rng(8)
-    s = np.cumsum(random.uniform(0.1, 1.9, 520))
-    s = np.concatenate([[0.0], s[s < 519], [520.0]])
-    line = design().xyz(s) + 0.001 * random.standard_normal((len(s), 3))
-    found = fit(Track(1, line, NONE, np.zeros(len(s), dtype=bool))).alignment
-    assert [one.type for one in found.plan] == ["line", "clothoid", "arc", "clothoid", "line"]
-    np.testing.assert_allclose([one.s_from for one in found.plan], [0, 120, 180, 330, 380], atol=0.6)
-
-
-@pytest.mark.parametrize("step", [5, 12, 25])
-def test_a_line_with_few_vertices_gives_a_curve_that_follows_it(step):
-    whole = design()
-    s = np.append(np.arange(0.0, 520.0, step), 520.0)
-    found = fit(Track(1, whole.xyz(s), NONE, np.zeros(len(s), dtype=bool))).alignment
-    off = found.foot(whole.places(np.arange(2.0, 518.0))).across_m
-    assert np.abs(off).max() < 0.002 * step
 
 
 def test_round_radii_are_proposed_within_the_standard_error():

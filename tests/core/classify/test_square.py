@@ -7,9 +7,7 @@ from hypothesis import strategies as st
 from rail_extract.core.classify.settings import Settings
 from rail_extract.core.classify.square import classify_square
 from rail_extract.laboratory.ruler.whole_clouds import classify_cloud
-from rail_extract.laboratory.scenes.raw_catalogue import RAW_SCENES
 from rail_extract.laboratory.scenes.raw_shapes import MIDDLE, TOP_M, flat, rough, turned, with_bar, with_track
-from scipy.spatial import cKDTree
 
 GAUGE, WIDTH = 1.435, 0.072
 SPACING = GAUGE + WIDTH
@@ -44,14 +42,6 @@ def test_rails_are_labelled_where_next_to_nothing_of_the_ground_is_seen():
     found = classify_square(xyz, SETTINGS).rail
     assert (found & on)[inner(xyz, 10)].sum() / on[inner(xyz, 10)].sum() > 0.9
     assert (found & on).sum() / found.sum() > 0.95
-
-
-def test_canted_rails_on_their_canted_bed():
-    rng = np.random.RandomState(4)
-    xyz, on = ballasted(rng)
-    xyz[:, 2] += 0.1 * turned(xyz, 0.3)[1]
-    found = classify_square(xyz, SETTINGS).rail
-    assert (found & on)[inner(xyz, 8)].sum() / on[inner(xyz, 8)].sum() > 0.99
 
 
 @pytest.mark.parametrize("left", [SPACING / 2 - WIDTH - 0.045, SPACING / 2 + 0.4])
@@ -227,18 +217,3 @@ def test_nothing_comes_of_nothing(xyz):
     found = classify_cloud(xyz, SETTINGS)
     assert not found.rail.any()
     assert found.rail.shape == (len(xyz),)
-
-
-def test_rails_of_a_survey_by_images_are_found_where_their_heads_are_round_ridges():
-    scene = RAW_SCENES["photo curve blunt"](2)
-    found = classify_cloud(scene.xyz, Settings((scene.standard.gauge_m,), scene.standard.head_width_m))
-    labelled = scene.xyz[found.rail, :2]
-    near, low, high = cKDTree(labelled), labelled.min(axis=0), labelled.max(axis=0)
-    for rail in scene.rails:
-        inside = ((rail[:, :2] > low) & (rail[:, :2] < high)).all(axis=1)
-        assert (near.query(rail[inside, :2])[0] < 0.12).mean() > 0.97
-    rails = cKDTree(np.concatenate([rail[:, :2] for rail in scene.rails]))
-    assert (rails.query(labelled)[0] < 0.3).all()
-    length_m = sum(np.linalg.norm(np.diff(rail[:, :2], axis=0), axis=1).sum() for rail in scene.rails)
-    assert found.figures.blunt_m == found.figures.paired_m + found.figures.single_m == pytest.approx(length_m, rel=0.1)
-    assert 0.04 < found.figures.blur_m < 0.07

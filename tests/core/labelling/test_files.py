@@ -220,17 +220,6 @@ def test_ground_has_no_rail(tmp_path):
     ]
 
 
-def test_rails_without_their_bed_are_not_found_and_the_warning_says_why(tmp_path, scene):
-    xyz, on = scene
-    source = save(tmp_path / "rails.las", xyz[on])
-    result, progress = classify(tmp_path, [source], tmp_path / "new.las")
-    assert result.figures.points == 0
-    assert progress.warnings[-1] == (
-        "No rail was found: check the rail standard and the unit of the coordinates. A cloud that contains only "
-        "rail points needs no classification."
-    )
-
-
 @pytest.mark.parametrize("count", [1, 2])
 def test_of_two_runs_onto_one_output_the_later_one_says_so_and_changes_nothing(tmp_path, scene, count):
     sources = [save(tmp_path / f"raw{number}.las", scene[0][:20_000]) for number in range(count)]

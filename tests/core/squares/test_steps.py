@@ -4,12 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from built import cloud_of, source_of
+from built import source_of
 from rail_extract.core.clouds.points import RailPoints
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.frpdf.cleanup import clean
 from rail_extract.core.parameters import Parameters
-from rail_extract.core.pipeline import extract_rails
 from rail_extract.core.raster import TILE, cell_size, rasterize
 from rail_extract.core.squares.steps import assembled, clean_square, engine_for, merged, mosaic, own_tiles, square_side
 from rail_extract.core.standards import STANDARDS
@@ -48,23 +47,6 @@ def test_a_gap_at_a_border_is_bridged_as_in_an_undivided_raster(passes):
         assert len(cells ^ whole) < 0.02 * len(
             whole
         )  # 0.0153 with the margin of 64 cells; without one, the gap stays open
-
-
-def test_thin_rails_are_drawn_for_the_network_and_measured_on_their_points():
-    """Five points per metre of rail, at random: the network of the paper alone finds nothing there."""
-    parameters = Parameters(STANDARD.gauge_m, STANDARD.head_width_m, engine="OPENCV", model="base")
-    random, spacing_m = np.random.RandomState(3), STANDARD.gauge_m + STANDARD.head_width_m
-    x, left = random.uniform(0, 40, 400), random.random_sample(400) < 0.5
-    y = spacing_m * left + random.uniform(-0.036, 0.036, 400)
-    cloud = cloud_of(np.column_stack([x, y, random.normal(0, 0.01, 400)]))
-    alone = clean(rasterize(cloud.xyz, cell_size(STANDARD.gauge_m, STANDARD.head_width_m)), engine_for(parameters))
-    assert alone.count() < 500
-    rails = extract_rails([cloud], parameters).rails
-    assert sorted(round(rail.length_m) for rail in rails) in ([38, 38], [38, 39], [39, 39], [39, 40], [40, 40])
-    for rail in rails:
-        side_m = spacing_m * (rail.xyz[0, 1] > spacing_m / 2)
-        assert np.sqrt(np.mean((rail.xyz[:, 1] - side_m) ** 2)) < 0.012
-        assert rail.points < 210
 
 
 def test_rasters_of_squares_make_the_raster_of_the_whole():

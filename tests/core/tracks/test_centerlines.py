@@ -62,23 +62,6 @@ def test_a_ring_becomes_one_closed_centerline(begins, turned):
     assert line.bridged_m < 0.1
 
 
-@pytest.mark.parametrize("curve", [STRAIGHT, CURVED])
-def test_three_tracks_give_three_centerlines_at_gauge(curve):
-    lines = [track(curve, left_m) for left_m in (0.0, 4.0, 8.0)]
-    rails = rails_of(*(rail for left, right, _ in lines for rail in (left, right)))
-    found = build_centerlines(rails, STANDARD)
-    assert len(found) == 3
-    assert [line.track_id for line in found] == [1, 2, 3]
-    for line in found:
-        assert line.gauge_mm == pytest.approx(1435.0, abs=1.0)
-        assert line.length_m == pytest.approx(curve.length_m, rel=0.05)
-        assert line.bridged_m < 1.0
-    result = compare_lines([line.xyz for line in found], [middle for _, _, middle in lines])
-    assert result.completeness > 0.995
-    assert result.correctness > 0.995
-    assert result.lateral_rmse_m < 0.0015
-
-
 @pytest.mark.parametrize("sign", [1, -1])
 @pytest.mark.parametrize("heading", [0.5, 0.5 + np.pi])
 def test_cant_is_left_minus_right_along_the_line(sign, heading):

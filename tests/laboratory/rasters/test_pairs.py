@@ -84,12 +84,3 @@ def test_a_gap_has_the_number_of_cells_of_its_length():
 
 def _at_border(mask):
     return mask[[0, -1]].any() or mask[:, [0, -1]].any() or not mask.any()
-
-
-def test_distractors_are_seen_and_not_in_the_label():
-    guard = straight(left_m=0.6)
-    pair = draw_pair(np.random.default_rng(0), Layout((straight(left_m=0.75),), (guard,)), WINDOW, WIDTH, 0.0)
-    ideal = np.zeros_like(pair.label)
-    draw_label(ideal, WINDOW, guard.xy, guard.normal, WIDTH)
-    assert not pair.label[ideal].any()
-    assert pair.distractor[ideal].mean() > 0.8

@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rail_extract.core.rails import Centerline, RailLine, TrackGeometry
+from built import geometry_of
+from rail_extract.core.rails import Centerline, RailLine
 from rail_extract.laboratory.curves import Element, trace
 from rail_extract.laboratory.ruler.lines import compare_lines, match
 from rail_extract.laboratory.ruler.tracks import compare_geometry, compare_tracks
@@ -99,21 +100,12 @@ def test_measured_geometry_is_compared_with_the_truth():
     rails = [np.column_stack([curve.offset(left), np.full(len(curve.xy), left / 100)]) for left in (0.75, -0.75)]
     middle = np.column_stack([curve.xy, np.zeros(len(curve.xy))])
     at = np.searchsorted(curve.chainage, np.arange(1.0, 139.0))
-    track = TrackGeometry(
-        track_id=1,
-        xyz=middle[at],
-        chainage_m=curve.chainage[at],
+    track = geometry_of(
+        middle[at],
+        curve.chainage[at],
         gauge_mm=np.full(len(at), 1.5e3 - 72 + 2.0),
         cant_mm=np.full(len(at), 15.0 - 1.0),
-        twist_mm=np.zeros(len(at)),
         radius_m=np.where(curve.chainage[at] > 60, 606.0, np.nan),
-        grade_pm=np.zeros(len(at)),
-        sigma_mm=np.ones(len(at)),
-        points=np.ones(len(at), dtype=int),
-        bridged=np.zeros(len(at), dtype=bool),
-        strips=np.ones(len(at), dtype=int),
-        strip_mm=np.full(len(at), np.nan),
-        sigmaz_mm=np.full(len(at), np.nan),
     )
     errors = compare_geometry([track], rails, [middle], 0.072)
     assert errors.gauge_m == pytest.approx(0.002, abs=1e-4)

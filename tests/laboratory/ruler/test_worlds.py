@@ -4,9 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from built import geometry_of
 from rail_extract.core.comparison.measures import cut
 from rail_extract.core.frame import LocalFrame
-from rail_extract.core.rails import Centerline, RailLine, RailNetwork, Support, TrackGeometry
+from rail_extract.core.polyline import length_along
+from rail_extract.core.rails import Centerline, RailLine, RailNetwork, Support
 from rail_extract.laboratory.ruler.rates import bounds, mcnemar, summary
 from rail_extract.laboratory.ruler.worlds import ACROSS, FALSE, FEWER, HEIGHT, MISSING, MORE, judge, to_be_found
 from rail_extract.laboratory.worlds.world import make
@@ -31,25 +33,9 @@ def network_of(world, lines, sigma_m=0.001):
     ids = tuple(rail.rail_id for rail in rails)
     gauge = 1000 * world.scene.standard.gauge_m
     track = Centerline(middle, 1, 10, ids[:1], ids[1:2], gauge, 0.0, 0.0, 0.0, 0.0)
-    count = len(middle)
-    at = np.concatenate([[0], np.cumsum(np.hypot(*np.diff(middle[:, :2], axis=0).T))])
-    good, nothing = np.ones(count), np.zeros(count, dtype=bool)
-    geometry = TrackGeometry(
-        1,
-        middle,
-        at,
-        gauge * good,
-        0 * good,
-        0 * good,
-        np.nan * good,
-        0 * good,
-        1000 * sigma_m * good,
-        100 * good.astype(int),
-        nothing,
-        good.astype(int),
-        np.nan * good,
-        1000 * sigma_m * good,
-    )
+    errors = np.full(len(middle), 1000 * sigma_m)
+    at = length_along(middle[:, :2])
+    geometry = geometry_of(middle, at, gauge_mm=np.full(len(middle), gauge), sigma_mm=errors, sigmaz_mm=errors)
     return RailNetwork(tuple(rails), (track,), LocalFrame(np.zeros(3)), geometry=(geometry,))
 
 

@@ -131,32 +131,6 @@ def test_rails_of_two_classes_make_a_track_when_merged(run, new_feedback, write_
     assert {items["class_code"] for _, items in read_features(tmp_path / "rails.gpkg")} == {11}
 
 
-def test_strips_are_stated_and_aligned(run, write_cloud, track, tmp_path, new_feedback):
-    points = np.concatenate([track(length_m=20.0)] * 2)
-    strips = np.repeat([7, 9], len(points) // 2)
-    # A third of the points are of strip 9, 20 mm to the left and 8 mm above strip 7.
-    points[strips == 9] += [0.0, 0.020, 0.008]
-    kept = (strips == 7) | (np.arange(len(points)) % 2 == 0)
-    cloud, middle = write_cloud(points[kept], strips=strips[kept]), {}
-    for how in ("AS_THEY_ARE", "ALIGNED"):
-        paths = {name: tmp_path / f"{how}_{name}.gpkg" for name in ("CENTERLINES", "QUALITY")}
-        feedback, report = new_feedback(), tmp_path / f"{how}.html"
-        outcome = run({"INPUT": cloud, "ITERATIONS": 1, "STRIPS": how, "REPORT": report, **paths}, feedback)
-        assert outcome.ok, outcome.error
-        warning = next(text for text in feedback.warnings if "Where strips overlap" in text)
-        assert "differ by up to" in warning and ("set STRIPS to ALIGNED" in warning) == (how == "AS_THEY_ARE")
-        layer, stations = lines_of(paths["QUALITY"])
-        assert layer.fields().indexFromName("strips") >= 0
-        assert {station["strips"] for station in stations} == {2}
-        assert np.median([station["strip_mm"] for station in stations]) == pytest.approx(20, abs=1.5)
-        assert min(station["sigma_mm"] for station in stations) > 9
-        page = report.read_text(encoding="utf-8")
-        assert "Strips of track 1" in page and "strip 9" in page
-        _, (line,) = lines_of(paths["CENTERLINES"])
-        middle[how] = np.mean([vertex.y() for vertex in line.geometry().vertices()]) - 3_000_000
-    assert middle["ALIGNED"] == pytest.approx(0.010, abs=0.001)
-
-
 def test_the_log_names_steps_figures_and_verdict(run, scene, new_feedback, tmp_path):
     feedback = new_feedback()
     assert run({**scene, "ENGINE": "OPENCV", "REPORT": tmp_path / "report.html"}, feedback).ok
