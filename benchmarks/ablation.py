@@ -28,7 +28,7 @@ import numpy as np
 from golden import TABLE
 from processes import processes
 from rail_extract.core.classify.flush import NO_LINES, Flush
-from rail_extract.core.pipeline import drawing
+from rail_extract.core.pipeline import drawing, sources
 from rail_extract.core.polyline import Polyline
 from rail_extract.laboratory.ruler.golden import (
     PLACES,
@@ -43,6 +43,12 @@ from rail_extract.laboratory.ruler.golden import (
 from rail_extract.laboratory.ruler.rates import mcnemar
 from rail_extract.laboratory.ruler.worlds import run
 from rail_extract.laboratory.worlds.world import CLOUDS, make
+
+OF_SEARCH = ("classify.", "polyline.")
+"""Rules that the search for rail points in a raw cloud follows; without any other one, it is not made again."""
+
+OF_CLEANING = (*OF_SEARCH, "squares.steps.drawn")
+"""Rules that decide what the network cleans; without any other one, no square is cleaned again."""
 
 SHOWN = 3
 """Differences printed for each rule: the largest, by their tolerances."""
@@ -266,12 +272,20 @@ def ablate_world(task: tuple[int, str, Sequence[str]]) -> Outcome:
     world = make(seed, cloud)
     chosen = [switch for switch in SWITCHES if switch.name in names]
     effective: set[str] = set()
-    with _watched(chosen, effective):
-        before = bool(run(world).faults)
-    without = {}
-    for switch in (switch for switch in chosen if switch.name in effective):
-        with _without(switch):
-            without[switch.name] = bool(run(world).faults)
+    with ExitStack() as kept:
+        searched = kept.enter_context(_kept(sources, "find_rail_points", _listing))
+        cleaned = kept.enter_context(_kept(drawing, "clean_square", _remembering))
+        with _watched(chosen, effective):
+            before = bool(run(world).faults)
+        without = {}
+        for switch in (switch for switch in chosen if switch.name in effective):
+            with ExitStack() as stack:
+                if switch.name.startswith(OF_SEARCH):
+                    stack.enter_context(patch.object(sources, "find_rail_points", searched))
+                if switch.name.startswith(OF_CLEANING):
+                    stack.enter_context(patch.object(drawing, "clean_square", cleaned))
+                stack.enter_context(_without(switch))
+                without[switch.name] = bool(run(world).faults)
     print(f"{cloud} world {seed}: {'fails' if before else 'right'}", file=sys.stderr, flush=True)
     return before, without
 
@@ -327,13 +341,34 @@ def _watching(rule: Callable, instead: Callable, name: str, effective: set[str])
     return wrapped
 
 
+@contextmanager
+def _kept(module: Any, name: str, keeping: Callable[[Callable], Callable]) -> Iterator[Callable]:
+    """Keep the results of a function; yields the function that computes them each time."""
+    function = getattr(module, name)
+    with patch.object(module, name, keeping(function)):
+        yield function
+
+
+def _listing(search: Callable) -> Callable:
+    """Wrap the search for rail points, so that it is made once."""
+    results: list[list] = []
+
+    @wraps(search)
+    def wrapped(*arguments: Any) -> list:
+        if not results:
+            results.append(list(search(*arguments)))
+        return results[0]
+
+    return wrapped
+
+
 def _remembering(function: Callable) -> Callable:
     """Wrap the cleaning of a square, so that each square is cleaned once."""
     results: dict[tuple, Any] = {}
 
     @wraps(function)
     def wrapped(source: Any, square: Any, *others: Any) -> Any:
-        key = (source.class_code, square.key)
+        key = (source.class_code, square.key, source.counts.get(square.key))
         if key not in results:
             results[key] = function(source, square, *others)
         return results[key]

@@ -12,9 +12,9 @@ import numpy as np
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from ..lines.ends import Bridge, bridge, cut_back, even_points
+from ..lines.ends import Bridge, bridge, cut_back, even_points, tip_and_direction
 from ..lines.network import LineNetwork
-from .junctions import DIRECTION_M, ends_by_node, unsteadiness
+from .junctions import DIRECTION_M, ends_by_node, unsteadiness, weld_pairs
 
 MAX_MERGED_M = 14.0
 """Largest length that two crossing rails share. Heads of 76 mm in cells of 40 mm share 9 m at 1:26.5, and wing rails
@@ -38,6 +38,10 @@ WINGS_M = (0.0, 1.0, 2.0, 3.0)
 """Further lengths cut off all legs before they are paired, in this order: wing rails run beside the rails for up to 3 m
 on the side of the nose, and where they hide it from a scanner, legs are drawn along them."""
 
+BESIDE_M = 0.4
+"""Largest distance of a leg that a flangeway cuts off from the rail that crosses it: two half heads and a flangeway are
+0.14 m, and 2.5 m (`TANGLE_M`) of a rail at 1:9 are 0.28 m aside."""
+
 _PAIRINGS = (((0, 2), (1, 3)), ((0, 3), (1, 2)), ((0, 1), (2, 3)))
 
 
@@ -46,19 +50,82 @@ def resolve_crossings(network: LineNetwork) -> LineNetwork:
 
     A crossing is a node of four lines; or a short line between two nodes of three; or a node of three whose fourth leg
     ends freely before it, because a flangeway of the frog cuts it off; or several nodes and ends close together, which
-    four legs leave. It is resolved if its four legs form two pairs that rails could follow. The rails then cross
-    without a node; the network has no passes before.
+    four legs leave; or a line beside which two free ends face each other, because flangeways cut off two legs. It is
+    resolved if its four legs form two pairs that rails could follow. The rails then cross without a node; the network
+    has no passes before.
     """
     joins: dict[tuple[int, int], Bridge] = {}
     cuts_m: dict[int, float] = {}
     dropped: list[int] = []
-    for shared, legs in _crossings(network):
+    network, facing = _cut_beside_ends(network)
+    for shared, legs in (*_crossings(network), *facing):
         pairing = _best_pairing(network, legs)
-        if pairing and not any(end in cuts_m for end in legs):
+        crosses = (shared, legs) not in facing or tuple(legs)[:2] not in pairing
+        if pairing and crosses and not any(end in cuts_m for end in legs):
             joins.update(pairing)
             cuts_m.update(legs)
             dropped += shared
-    return network.bridged(joins, cuts_m, dropped)
+    return weld_pairs(network.bridged(joins, cuts_m, dropped))
+
+
+def _cut_beside_ends(network: LineNetwork) -> tuple[LineNetwork, list[tuple[list[int], dict[int, float]]]]:
+    """Cut lines beside which two free ends face each other, both on one side, at the feet of these.
+
+    Where two rails cross, such a line is the one of them as far as the first foot and the other one from the second
+    foot on. Also returns the shared part of each crossing and its four legs, those of the line first: without a
+    crossing they are one rail.
+    """
+    nodes, passes, facing = list(network.nodes), [], []
+    for number, vertices, tips in _beside_ends(network):
+        feet = [len(nodes), len(nodes) + 1]
+        nodes += list(network.lines[number][vertices])
+        passes += [(node, number, vertex) for node, vertex in zip(feet, vertices)]
+        facing.append((feet, tips))
+    if not facing:
+        return network, []
+    cut, _ = replace(network, nodes=np.array(nodes), passes=np.array(passes)).parted()
+    at_node, lengths = dict(ends_by_node(cut)), cut.lengths()
+    crossings = []
+    for feet, tips in facing:
+        shared = set.intersection(*({end // 2 for end in at_node[node]} for node in feet))
+        ends = [end for node in (*feet, *tips) for end in at_node[node] if end // 2 not in shared]
+        legs = dict.fromkeys(ends, SKIP_M)
+        if len(shared) == 1 and _are_legs(lengths, legs):
+            crossings.append((sorted(shared), legs))
+    return cut, crossings
+
+
+def _beside_ends(network: LineNetwork) -> Iterator[tuple[int, list[int], list[int]]]:
+    """Yield lines beside two free ends that face each other: number, vertices at the feet in order, and their nodes."""
+    free = np.flatnonzero(network.degrees()[network.ends.ravel()] == 1)
+    if len(free) < 2:
+        return
+    tips = [tip_and_direction(even_points(network.from_end(end), DIRECTION_M)) for end in free.tolist()]
+    places, outward = (np.array(one) for one in zip(*tips))
+    feet = _feet(network, places)
+    for one, other in sorted(cKDTree(places).query_pairs(MAX_MERGED_M)):
+        across = places[other] - places[one]
+        if across @ outward[one] < 0 or across @ outward[other] > 0:
+            continue
+        for number in sorted((feet[one].keys() & feet[other].keys()) - {int(free[one]) // 2, int(free[other]) // 2}):
+            line = network.lines[number]
+            first, last = feet[one][number], feet[other][number]
+            along, aside = line[last] - line[first], places[[one, other]] - line[[first, last]]
+            left = along[0] * aside[:, 1] - along[1] * aside[:, 0]
+            if first != last and left[0] * left[1] > 0:
+                step = 1 if first < last else -1
+                yield number, [first, last][::step], network.ends.flat[free[[one, other]]][::step].tolist()
+
+
+def _feet(network: LineNetwork, places: np.ndarray) -> list[dict[int, int]]:
+    """Return for each place, (n, 2), the nearest vertex, within `BESIDE_M`, of each line inside its ends."""
+    vertices = [(number, vertex) for number, line in enumerate(network.lines) for vertex in range(1, len(line) - 1)]
+    xy = np.concatenate([np.empty((0, 2)), *(line[1:-1] for line in network.lines)])
+    found = []
+    for place, near in zip(places, cKDTree(xy).query_ball_point(places, BESIDE_M)):
+        farthest_first = sorted(near, key=lambda one: -float(np.hypot(*(xy[one] - place))))
+        found.append(dict(vertices[one] for one in farthest_first))
+    return found
 
 
 def _crossings(network: LineNetwork) -> Iterator[tuple[list[int], dict[int, float]]]:
@@ -76,11 +143,14 @@ def _crossings(network: LineNetwork) -> Iterator[tuple[list[int], dict[int, floa
     ]
     crossings += [([], legs) for legs in _cut_off(network)] + list(_tangled(network))
     for lines, legs in crossings:
-        long = all(
-            lengths[end // 2] > 3 * SKIP_M and lengths[end // 2] > skip_m + SKIP_M for end, skip_m in legs.items()
-        )
-        if len({end // 2 for end in legs}) == 4 and long:
+        if _are_legs(lengths, legs):
             yield lines, legs
+
+
+def _are_legs(lengths: np.ndarray, legs: Mapping[int, float]) -> bool:
+    """Return whether these are ends of four different lines, long enough to show where their rails run."""
+    least_m = {end // 2: max(3 * SKIP_M, skip_m + SKIP_M) for end, skip_m in legs.items()}
+    return len(legs) == len(least_m) == 4 and all(lengths[line] > length_m for line, length_m in least_m.items())
 
 
 def _tangled(network: LineNetwork) -> Iterator[tuple[list[int], dict[int, float]]]:

@@ -50,3 +50,29 @@ def test_a_frog_of_several_nodes_is_one_crossing():
     legs = [(0, leg(-1, SLOPE, 0.8)), (0, leg(-1, -SLOPE, 0.8)), (1, leg(1, SLOPE, 0.8)), (2, leg(1, -SLOPE, 1.7))]
     links = [(0, (0.0, 0.12), 1), (0, (0.0, -0.06), 1)]
     check_that_two_rails_cross(resolve_crossings(network(legs, links, nodes)))
+
+
+def beside(through, first, last):
+    """A line through, and two lines whose free ends face each other beside it."""
+    lines = [through, first, last]
+    ends = np.concatenate([line[[0, -1]] for line in lines])
+    return LineNetwork(tuple(lines), ends, np.arange(6).reshape(-1, 2))
+
+
+def test_a_line_that_changes_from_rail_to_rail_where_flangeways_cut_both_off_is_two_rails_that_cross():
+    through = np.concatenate([leg(-1, SLOPE, 0.2)[::-1], leg(1, -SLOPE, 0.2)])
+    found = resolve_crossings(beside(through, leg(-1, -SLOPE, 1.5)[::-1], leg(1, SLOPE, 1.5)))
+    check_that_two_rails_cross(found)
+
+
+def test_check_rails_that_face_each_other_beside_a_rail_do_not_cross_it():
+    x = np.arange(-25.0, 25.0, 0.2)
+    apart = beside(
+        *(
+            np.column_stack([x[own], np.full(own.sum(), y)])
+            for own, y in ((np.isfinite(x), 0.0), (x < -1.5, 0.15), (x > 1.5, 0.15))
+        )
+    )
+    found = resolve_crossings(apart)
+    assert sorted(map(len, found.lines)) == sorted(map(len, apart.lines))
+    assert all(np.ptp(line[:, 1]) == 0 for line in found.lines)
