@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import ParameterError
 from ..fields import AIRBORNE
 from ..parameters import AIRBORNE_CLASSES, AirborneParameters
-from ..progress import Estimating
+from ..progress import Estimating, Progress
 from ..standards import SEARCHED_CLASSES
 from . import inputs, methods, outputs
 from .declaration import (
@@ -23,13 +23,11 @@ from .declaration import (
     Number,
     Text,
 )
-from .values import Job, class_numbers
+from .result import Result, ShownCloud
+from .values import Job, Values, class_numbers
 
 if TYPE_CHECKING:
     from ..airborne.survey import AirborneSurvey
-    from ..progress import Progress
-    from .result import Result
-    from .values import Values
 
 MAX_GUIDE_REACH_M, MAX_FOOTPRINT_M, MAX_RAIL_M = 6.0, 2.0, 0.5
 """Beyond, a guide means another track, a footprint covers both rails, and a rail is not a rail."""
@@ -58,7 +56,6 @@ def _class_codes(values: Values) -> tuple[int, ...]:
 def _run(values: Values, progress: Progress) -> Result:
     """Fit the tracks along the guides."""
     from ..airborne.files import Run, survey_files
-    from .result import ShownCloud
 
     progress, standard, codes = Estimating(progress), values.standard(), _class_codes(values)
     if values.wanted("PROPOSED"):
@@ -74,7 +71,6 @@ def _fitted(survey: AirborneSurvey, values: Values) -> Result:
     """Return what was found along the guides as a result."""
     from ..files.layers import airborne_stations_layer, findings_layer, lines_layer
     from ..report.airborne import airborne_findings, airborne_page, airborne_summary
-    from .result import Result
 
     facts = {"Rail": values.standard().label, "Command": values.command}
     figures: dict[str, Any] = {

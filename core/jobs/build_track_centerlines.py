@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from ..fields import CENTERLINES, RAILS
+from ..progress import Progress
 from . import inputs, methods, outputs
 from .declaration import LINE_NEEDS, RAIL_WORDS, STEPS, TRACK_WORDS, LayerInput
-from .values import Job
-
-if TYPE_CHECKING:
-    from ..progress import Progress
-    from .result import Result
-    from .values import Values
+from .result import Result
+from .values import Job, Values
 
 
 def _check(values: Values) -> None:
@@ -26,7 +22,6 @@ def _run(values: Values, progress: Progress) -> Result:
     from ..checks.lines import with_tracks
     from ..files.layers import lines_layer
     from ..tracks.centerlines import tracks_of
-    from .result import Result
 
     reading, pairing = progress.after_reading()
     lines, standard = values.lines("INPUT", reading), values.standard()

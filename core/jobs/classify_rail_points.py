@@ -6,18 +6,16 @@ from typing import TYPE_CHECKING
 
 from ..errors import ParameterError
 from ..parameters import DEFAULT_GUIDE_DISTANCE_M, Parameters
-from ..progress import Estimating
+from ..progress import Estimating, Progress
 from ..standards import SEARCHED_CLASSES
 from . import inputs, methods, outputs
 from .declaration import CLOUD_NEEDS, CLOUD_WORDS, RAIL_WORDS, RAW_CLOUDS, Flag, Number
-from .values import Job
+from .result import Result
+from .values import Job, Values
 
 if TYPE_CHECKING:
     from ..clouds.points import Request
     from ..labelling.files import ClassifiedFiles
-    from ..progress import Progress
-    from .result import Result
-    from .values import Values
 
 
 def _check(values: Values) -> None:
@@ -58,8 +56,6 @@ def _run(values: Values, progress: Progress) -> Result:
 
 def classified(found: ClassifiedFiles, request: Request) -> Result:
     """Return the result of a job that writes a classified copy."""
-    from .result import Result
-
     figures = {
         "OUTPUT": str(found.file),
         "POINT_COUNT": found.point_count,

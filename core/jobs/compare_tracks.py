@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import ParameterError
 from ..fields import DIFFERENCE_FIELDS
 from ..parameters import ComparisonParameters
+from ..progress import Progress
 from . import methods, outputs
 from .declaration import (
     ALIGNMENT,
@@ -23,14 +24,12 @@ from .declaration import (
     LayerOutput,
     Number,
 )
-from .values import Job
+from .result import Result
+from .values import Job, Values
 
 if TYPE_CHECKING:
     from ..comparison.tracks import Survey, TrackComparison
     from ..frame import LocalFrame
-    from ..progress import Progress
-    from .result import Result
-    from .values import Values
 
 SURVEYS = {"REFERENCE": ("REFERENCE_RAILS", "REFERENCE_SIGMA"), "INPUT": ("RAILS", "INPUT_SIGMA")}
 """Rails and standard error of each survey, by its lines."""
@@ -68,7 +67,6 @@ def _run(values: Values, progress: Progress) -> Result:
     from ..comparison.tracks import compare_surveys, doubts_of
     from ..files.layers import differences_layer
     from ..report.comparison import build_comparison, describe_shift, verdict_on
-    from .result import Result
 
     reading, comparing = progress.after_reading()
     earlier, later = reading.split(2)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from .. import VERSION
+from ..progress import Progress
 from . import inputs, outputs
 from .declaration import (
     ALIGNMENT,
@@ -17,12 +17,8 @@ from .declaration import (
     FileOutput,
     LayerInput,
 )
-from .values import Job
-
-if TYPE_CHECKING:
-    from ..progress import Progress
-    from .result import Result
-    from .values import Values
+from .result import Result
+from .values import Job, Values
 
 CIRCLES, PARABOLAS = VERTICAL_CURVES = ("CIRCLES", "PARABOLAS")
 
@@ -39,7 +35,6 @@ def _check(values: Values) -> None:
 def _run(values: Values, progress: Progress) -> Result:
     """Read the table, check it and write the file."""
     from ..files.design_files import check_designs, left_out, write_designs
-    from .result import Result
     from .track_inputs import read_elements
 
     reading, rest = progress.after_reading()

@@ -8,21 +8,20 @@ from typing import TYPE_CHECKING, Any
 from ..errors import ParameterError
 from ..frpdf.models import choose as choose_model
 from ..parameters import LEARNED, STRIPS, Parameters
-from ..progress import Estimating
+from ..progress import Estimating, Progress
 from ..standards import DEFAULT, SEARCHED_CLASSES
 from . import inputs, methods, outputs
 from .declaration import CLOUD_NEEDS, CLOUD_WORDS, RAIL_WORDS, TRACK_WORDS, Choice, Flag, RasterOutput
-from .values import Job
+from .result import Result, ShownCloud
+from .values import Job, Values
 
 if TYPE_CHECKING:
     from ..clouds.points import Request
     from ..pipeline.sources import Source
-    from ..progress import Progress
     from ..rails import RailNetwork
     from ..report import Origin
     from ..standards import RailStandard
-    from .result import Rasters, Result
-    from .values import Values
+    from .result import Rasters
 
 MEASURED = ("QUALITY", "FINDINGS", "REPORT")
 """Outputs for which the geometry of tracks is measured."""
@@ -118,7 +117,6 @@ def _result(values: Values, network: RailNetwork, origin: Origin) -> Result:
     """Return what was extracted as a result."""
     from ..checks.listing import summary
     from ..files.layers import network_makers
-    from .result import Result, ShownCloud
 
     figures: dict[str, Any] = {
         **outputs.figures_of(network.rails, "RAIL"),

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from ..parameters import TRANSITIONS, FitParameters
+from ..progress import Progress
 from . import inputs, methods, outputs
 from .declaration import (
     ALIGNMENT,
@@ -22,14 +23,12 @@ from .declaration import (
     LayerInput,
     Number,
 )
-from .values import Job
+from .result import Result
+from .values import Job, Values
 
 if TYPE_CHECKING:
     from ..alignment.fit import Fit
     from ..alignment.measured import Deviations
-    from ..progress import Progress
-    from .result import Result
-    from .values import Values
 
 MIN_FIT_TOLERANCE_MM, MAX_ELEMENT_M = 0.1, 1000.0
 """No scanner resolves a smaller tolerance, and no element that is left out on purpose is longer."""
@@ -49,7 +48,6 @@ def _run(values: Values, progress: Progress) -> Result:
     from ..files.layers import elements_layer, stations_layer
     from ..progress import Recording
     from ..report import build_alignment_page
-    from .result import Result
     from .track_inputs import read_elements, read_tracks
 
     progress = Recording(progress)

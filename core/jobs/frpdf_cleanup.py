@@ -8,16 +8,15 @@ from typing import TYPE_CHECKING
 
 from ..errors import RasterError
 from ..frpdf.models import MODELS, Model, choose
+from ..progress import Progress
 from . import inputs, methods, outputs
 from .declaration import RAIL_WORDS, STEPS, RasterOutput
-from .values import Job
+from .result import Result
+from .values import Job, Values
 
 if TYPE_CHECKING:
     from ..files.rail_rasters import RasterHeader
-    from ..progress import Progress
     from ..standards import RailStandard
-    from .result import Result
-    from .values import Values
 
 CELL_TOLERANCE = 0.03
 """Relative deviation allowed from the cell size that the network expects; its training covered such a deviation."""
@@ -60,7 +59,6 @@ def _run(values: Values, progress: Progress) -> Result:
     """Clean each band."""
     from ..frpdf.cleanup import clean, make_engine
     from ..frpdf.weights import load_arrays
-    from .result import Result
 
     header, model = _planned(values)
     engine = make_engine(load_arrays(model.path), values["ENGINE"], values["DEVICE"])

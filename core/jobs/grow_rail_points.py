@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from ..errors import ParameterError
 from ..parameters import GrowParameters
-from ..progress import Estimating
+from ..progress import Estimating, Progress
 from ..standards import SEARCHED_CLASSES
 from . import inputs, methods, outputs
 from .classify_rail_points import classified
@@ -23,12 +22,8 @@ from .declaration import (
     Parameter,
     Place,
 )
-from .values import Job
-
-if TYPE_CHECKING:
-    from ..progress import Progress
-    from .result import Result
-    from .values import Values
+from .result import Result
+from .values import Job, Values
 
 _GROWTH: tuple[Parameter, ...] = (
     Flag(

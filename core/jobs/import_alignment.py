@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ..errors import CrsError, ParameterError
+from ..progress import Progress
 from . import inputs, outputs
 from .declaration import (
     ALIGNMENT,
@@ -19,14 +20,12 @@ from .declaration import (
     LayerInput,
     LayerOutput,
 )
-from .values import Job
+from .result import Result
+from .values import Job, Values
 
 if TYPE_CHECKING:
     from ..alignment.elements import Alignment
     from ..alignment.measured import Deviations
-    from ..progress import Progress
-    from .result import Result
-    from .values import Values
 
 
 def _check(values: Values) -> None:
@@ -64,7 +63,6 @@ def _run(values: Values, progress: Progress) -> Result:
     from ..files.layers import axes_layer, elements_layer, stations_layer
     from ..progress import Recording
     from ..report import build_alignment_page
-    from .result import Result
 
     progress, path = Recording(progress), values["INPUT"]
     reading, comparing = progress.after_reading()

@@ -9,17 +9,15 @@ from typing import TYPE_CHECKING
 
 from ..fields import QUALITY_FIELDS
 from ..parameters import Parameters
-from ..progress import Recording
+from ..progress import Progress, Recording
 from ..standards import CUSTOM, RailStandard, resolve
 from . import inputs, methods, outputs
 from .declaration import CLOUD_NEEDS, RAIL_WORDS, TRACK_WORDS, LayerInput
-from .values import Job
+from .result import Result, ShownCloud
+from .values import Job, Values
 
 if TYPE_CHECKING:
-    from ..progress import Progress
     from ..rails import TrackGeometry
-    from .result import Result
-    from .values import Values
 
 
 def _check(values: Values) -> None:
@@ -48,7 +46,6 @@ def _run(values: Values, progress: Progress) -> Result:
     from ..squares.remeasuring import measure_rails
     from ..tracks.geometry import measure_track_geometry
     from ..tracks.parallels import widths_by_gauge
-    from .result import Result, ShownCloud
     from .track_inputs import check_gauges, read_inputs, with_measured_gauge
 
     progress, standard, head_width_m = Recording(progress), _stated(values), values.head_width_m()

@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from ..frpdf.models import choose
+from ..progress import Progress
 from . import inputs
 from .declaration import CLOUD_WORDS, RAIL_WORDS, STEPS, RasterOutput
-from .values import Job
-
-if TYPE_CHECKING:
-    from ..progress import Progress
-    from .result import Result
-    from .values import Values
+from .result import Result
+from .values import Job, Values
 
 
 def _check(values: Values) -> None:
@@ -29,7 +24,6 @@ def _run(values: Values, progress: Progress) -> Result:
     from ..files.rail_rasters import header_for
     from ..raster import cell_size, rasterize
     from ..tiles.grid import MemorySource
-    from .result import Result
     from .track_inputs import SQUARE_M
 
     standard = values.standard()

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any
 
 from ..disk import Destination
 from ..errors import ParameterError
-from ..files.layers import AnyLayer, written_by_name
 
 if TYPE_CHECKING:
     import geopandas
 
+    from ..files.layers import AnyLayer
     from ..files.rail_rasters import RasterHeader
     from ..frame import LocalFrame
     from ..raster import RailRaster
@@ -71,6 +71,7 @@ class Result:
         """Return a layer, such as "elements", as a table with the fields of docs/reference.md."""
         geopandas = package("geopandas")
         (written,) = self._made([layer])
+        from ..files.layers import written_by_name
         from ..files.writing import shapes_of
 
         columns = written_by_name(written)

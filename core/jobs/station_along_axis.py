@@ -6,18 +6,17 @@ from typing import TYPE_CHECKING
 
 from ..errors import CrsError, RailExtractError
 from ..fields import EXTENT_FIELDS, STATION_FIELDS
+from ..progress import Progress
 from . import inputs
 from .declaration import ALIGNMENT, LINE_NEEDS, PLACES, RAIL_WORDS, Figure, LayerInput, LayerOutput
-from .values import Job
+from .result import Result
+from .values import Job, Values
 
 if TYPE_CHECKING:
     import numpy as np
 
     from ..kilometres.axes import PlacedAxes
-    from ..progress import Progress
     from .features import PlacedFeatures
-    from .result import Result
-    from .values import Values
 
 
 def _check(values: Values) -> None:
@@ -48,7 +47,6 @@ def _run(values: Values, progress: Progress) -> Result:
     from ..files.layers import Copy
     from ..frame import LocalFrame
     from ..rails import Kilometres
-    from .result import Result
 
     reading, rest = progress.after_reading()
     locating, reaching = rest.split(2)

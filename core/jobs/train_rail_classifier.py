@@ -6,17 +6,15 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ..parameters import DEFAULT_EPOCHS
-from ..progress import Estimating, Until
+from ..progress import Estimating, Progress, Until
 from ..standards import SEARCHED_CLASSES
 from . import inputs, methods, outputs
 from .declaration import CLOUD_NEEDS, CLOUD_WORDS, RAIL_WORDS, RAW_CLOUDS, Figure, FileInput, FileOutput, Number
-from .values import Job
+from .result import Result
+from .values import Job, Values
 
 if TYPE_CHECKING:
     from ..learned.blocks import Plan
-    from ..progress import Progress
-    from .result import Result
-    from .values import Values
 
 MAX_EPOCHS, MAX_SEED = 10_000, 2**31 - 1
 """Weeks on any computer, and the largest seed of a random generator."""
@@ -42,7 +40,6 @@ def _run(values: Values, progress: Progress) -> Result:
     from ..classify.settings import Settings
     from ..labelling.training import train_classifier
     from ..report.training_card import build_card, facts_of
-    from .result import Result
 
     if values["MINUTES"] is not None:
         progress = Until(progress, 60 * values["MINUTES"])

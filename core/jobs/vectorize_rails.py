@@ -6,18 +6,17 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ..fields import RAILS
+from ..progress import Progress
 from . import inputs, methods, outputs
 from .declaration import CLOUD_NEEDS, CLOUD_WORDS, RAIL_WORDS, STEPS
-from .values import Job
+from .result import Result, ShownCloud
+from .values import Job, Values
 
 if TYPE_CHECKING:
     from ..frame import LocalFrame
-    from ..progress import Progress
     from ..rails import RailLine
     from ..raster import RailRaster
     from ..standards import RailStandard
-    from .result import Result
-    from .values import Values
 
 
 def _standard(values: Values) -> RailStandard:
@@ -36,7 +35,6 @@ def _run(values: Values, progress: Progress) -> Result:
     from ..files.layers import lines_layer
     from ..squares.steps import lines_of
     from .clouds import Area, read_points_in
-    from .result import Result, ShownCloud
 
     source, header = values.raster("INPUT"), values.raster("INPUT").header
     reading, drawing = progress.after_reading()
