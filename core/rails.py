@@ -418,7 +418,7 @@ class SearchFigures:
         Length of the rails with a partner that are as narrow as a head, and of those that are wider and round, before
         the cloud is known to be blunt; see `classify.ways`.
     unsure_m : float
-        Length of those that are wider and not round, and of rails in pavements.
+        Length of those that are wider, but not round and not too wide for a head, and of rails in pavements.
     """
 
     points: int = 0

@@ -1,7 +1,7 @@
 """The cross-section of the ridge under each piece: how wide it is, and how blunt.
 
-Dense matching of photographs and wide beams blur what they see: a head becomes a round ridge, wider than a head. The
-blur follows from the edges, and the largest width that a head may have from the blur (docs/classification.md).
+Dense matching of photographs and wide beams blur what they see: a head becomes a round ridge. The blur widens its foot
+and rounds its top; in between, it is as wide as a head is in any cloud (docs/classification.md).
 """
 
 from __future__ import annotations
@@ -31,19 +31,24 @@ BASE_M = 0.20
 """Distance from the axis within which a side is lowest at its base, and of which the outer half must be seen: the
 shoulder of the ballast may fall further on."""
 
-LEVELS = (0.25, 0.5, 0.75)
+LEVELS = (0.25, 0.75)
 """Parts of the way down from the top to the base at which the width of a side is measured."""
 
-WIDTH_PER_SIGMA, EDGE_PER_SIGMA = 2.355, 0.907
-"""Width at half the height of a Gaussian ridge, and distance between its levels of 25 and 75 %, by its standard
-deviation."""
+EDGE_PER_SIGMA = 0.907
+"""Distance between the levels of 25 and 75 % of a Gaussian ridge, by its standard deviation."""
 
 BLUR_QUANTILE = 0.25
 """Quantile of the ridges' roundness, by length, that stands for the blur of the square: earth is round in any cloud."""
 
-MAX_WIDTH = 1.1
-"""Largest width of a ridge by that of a head with the blur of the square. Measured: rails up to 1.07, mounds of ballast
-1.2 and more."""
+WIDER_M = 0.048
+"""Width of a ridge a quarter of the way down, beyond that of a head, up to which it may be one. Measured: rails in
+images that blur by 2 to 8 cm 0 to 40 mm; a head with a guard rail beside it and walls of earth between fields 55 mm and
+more."""
+
+STEADY_M = 1.0, 0.08
+"""Distances along and across within which axes are averaged. Those of single cells scatter by 5 to 30 mm, and the
+nearest of many is at the distance that is looked for; an arc of 25 m bends by 7 mm on average over this length, and
+both of its rails alike."""
 
 CRESTS_M = np.arange(-0.06, 0.061, 0.004)
 """Places across at which a crest is looked for: half a head and a cell to either side of the axis of the cells."""
@@ -57,10 +62,10 @@ LEAST_POINTS = 1.0
 
 @dataclass(frozen=True)
 class Ridges:
-    """The ridges under pieces of line, (pieces,) each; NaN where a side is not seen as far down as half the height.
+    """The ridges under pieces of line, (pieces,) each; NaN where a side is not seen as far down.
 
-    `width_m` is the width at half the height, `spread_m` the standard deviation of the Gaussian ridge whose sides are
-    as steep.
+    `width_m` is the width a quarter of the way down, `spread_m` the standard deviation of the Gaussian ridge whose
+    sides are as steep.
     """
 
     width_m: np.ndarray
@@ -76,8 +81,8 @@ class Ridges:
         with np.errstate(invalid="ignore"):
             top = np.fmax(*(side[:, 0] for side in sides))
             places = np.array([_levels(side, top) for side in sides])
-            spread_m = np.mean(places[:, 2] - places[:, 0], axis=0) / EDGE_PER_SIGMA
-        return cls(places[:, 1].sum(axis=0), spread_m, lengths(lines.axis, piece))
+            spread_m = np.mean(places[:, 1] - places[:, 0], axis=0) / EDGE_PER_SIGMA
+        return cls(places[:, 0].sum(axis=0), spread_m, lengths(lines.axis, piece))
 
     @property
     def blur_m(self) -> float:
@@ -90,11 +95,9 @@ class Ridges:
         return float(self.spread_m[order[np.searchsorted(below, BLUR_QUANTILE * below[-1])]])
 
     def may_be_heads(self, head_width_m: float) -> np.ndarray:
-        """Return which ridges are not wider than a head with the blur of the square, (pieces,) bool."""
-        blurred_m = WIDTH_PER_SIGMA * np.hypot(head_width_m / np.sqrt(12), self.blur_m)
-        widest_m = MAX_WIDTH * max(head_width_m, blurred_m)
+        """Return which ridges are as narrow as a head, (pieces,) bool."""
         with np.errstate(invalid="ignore"):
-            return self.width_m < widest_m
+            return self.width_m < head_width_m + WIDER_M
 
 
 def on_crests(xy: np.ndarray, height: np.ndarray, lines: Lines, blur_m: float) -> Lines:
@@ -113,6 +116,20 @@ def on_crests(xy: np.ndarray, height: np.ndarray, lines: Lines, blur_m: float) -
     before, at, after = (fits[best + step, np.arange(len(best))] for step in (-1, 0, 1))
     part = np.clip(0.5 * (after - before) / np.maximum(2 * at - before - after, 1e-12), -0.5, 0.5)
     offset_m = CRESTS_M[best] + part * (CRESTS_M[1] - CRESTS_M[0])
+    return replace(lines, axis=lines.axis + offset_m[:, None] * lines.across)
+
+
+def steadied(lines: Lines) -> Lines:
+    """Move axes to the mean of those near them, see `STEADY_M`."""
+    if not len(lines.axis):
+        return lines
+    along_m, across_m = STEADY_M
+    pairs = cKDTree(lines.axis).query_pairs(along_m, output_type="ndarray")
+    own, other = np.concatenate([pairs, pairs[:, ::-1]]).T
+    left_m = np.einsum("ij,ij->i", lines.axis[other] - lines.axis[own], lines.across[own])
+    near = np.abs(left_m) < across_m
+    own, left_m = own[near], left_m[near]
+    offset_m = np.bincount(own, left_m, len(lines.axis)) / (1 + np.bincount(own, minlength=len(lines.axis)))
     return replace(lines, axis=lines.axis + offset_m[:, None] * lines.across)
 
 

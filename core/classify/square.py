@@ -12,7 +12,7 @@ from .bed import COARSE_M, Bed, Coarse
 from .flush import NO_FLUSH, Flush, flush_rails
 from .labels import Near, label, whole_heads
 from .lines import SINGLE_COVER, Lines, Marks, centred, find_lines, reach_at
-from .partner import have_partners, runs_inside
+from .partner import are_within_gauge, have_partners, runs_inside
 from .pieces import (
     LEAST_SINGLE_M,
     lengths,
@@ -25,7 +25,7 @@ from .pieces import (
     stands_free,
     with_partner,
 )
-from .ridges import Ridges, cells_beside, on_crests
+from .ridges import Ridges, cells_beside, on_crests, steadied
 from .settings import BLUNT, MARGIN_M, Settings, Tolerances, Way
 from .tops import HIGH_M, LOW_M, MILLIMETRES, Band, Grid, Tops, highest_of_blocks, middles_of_tops, narrow_tops, tops_of
 
@@ -285,7 +285,9 @@ def _on_ridges(kept: Kept, thin: bool, shown: Shown, settings: Settings) -> Stan
         piece = pieces_of(len(kept.cell), kept.pairs)
         ridges = Ridges.measure(shown.xy, shown.height, kept.lines, piece)
         blur_m = ridges.blur_m
-        kept = kept.of(ridges.may_be_heads(settings.head_width_m)[piece])
+        heads = ridges.may_be_heads(settings.head_width_m)
+        heads &= are_within_gauge(steadied(kept.lines), piece, settings.spacings_m, BLUNT.partner_m)
+        kept = kept.of(heads[piece])
         kept = replace(kept, paired=_paired(kept.lines, settings, BLUNT))
         kept = kept.of(_long(kept, settings, False, BLUNT.least_m))
         kept = replace(kept, lines=on_crests(shown.xy, shown.height, kept.lines, blur_m))
@@ -445,7 +447,7 @@ def _widths(
         Rails: as narrow as a head in a square of this density.
     sharp, rounded, unsure : (n,) bool arrays
         Those with a partner that are as narrow as a head in a sharp cloud, those that are wider and round, and those
-        that are wider and steep.
+        that are wider and steep, but not too wide for a rail.
     """
     if not len(kept.cell):
         return (np.zeros(0, dtype=bool),) * 4
@@ -460,7 +462,7 @@ def _widths(
     if rounded.any():
         spread_m = Ridges.measure(shown.xy, shown.height, kept.lines, piece).spread_m
         rounded = rounded & (spread_m > settings.head_width_m / 2)[piece]
-        unsure = unsure & (spread_m <= settings.head_width_m / 2)[piece]
+        unsure = unsure & (narrow & (spread_m <= settings.head_width_m / 2))[piece]
     return np.where(partnered, narrow[piece], alone[piece]), sharp, rounded, unsure
 
 

@@ -1,0 +1,77 @@
+"""How wide the ridges of a blunt cloud are, and which of them may be heads."""
+
+import numpy as np
+import pytest
+from rail_extract.core.classify.lines import Lines
+from rail_extract.core.classify.ridges import steadied
+from rail_extract.core.classify.settings import Settings, Way
+from rail_extract.core.classify.square import classify_square
+from scipy.special import ndtr
+
+GAUGE_M, WIDTH_M, SIDE_M = 1.435, 0.072, 16.0
+FIELDS = "height", "theta", "cover", "pure"
+MATCHED_M = 0.092
+"""Width of a head with what matching adds."""
+
+
+def bars(width_m, height_m, blur_m, spacing_m=GAUGE_M + WIDTH_M, noise_m=0.004):
+    """Two bars in level ground, as images show them: (n, 3) points."""
+    places = np.arange(0.0, SIDE_M, 0.04)
+    xy = np.array(np.meshgrid(places, places)).reshape(2, -1).T
+    rng = np.random.RandomState(8)
+    xy = xy + rng.uniform(-0.02, 0.02, xy.shape)
+    off_m = xy[:, :1] - (7.0 + spacing_m * np.array([-0.5, 0.5]))
+    rise = ndtr((off_m + width_m / 2) / blur_m) - ndtr((off_m - width_m / 2) / blur_m)
+    return np.column_stack([xy, height_m * rise.sum(axis=1) + noise_m * rng.standard_normal(len(xy))])
+
+
+def found_m(xyz, way=Way.BLUNT):
+    return classify_square(xyz, Settings((GAUGE_M,), WIDTH_M, way=way)).figures
+
+
+@pytest.mark.parametrize("blur_m", [0.022, 0.042, 0.065])
+def test_heads_are_as_narrow_under_any_blur(blur_m):
+    assert found_m(bars(MATCHED_M, 0.17, blur_m)).paired_m == pytest.approx(2 * SIDE_M, rel=0.05)
+
+
+@pytest.mark.parametrize(("wider_m", "found"), [(-0.02, True), (0.015, True), (0.043, False)])
+def test_bars_further_apart_than_any_track_are_no_rails(wider_m, found):
+    """As kerbs on either side of a strip of lawn may be; their single cells seem to be nearer."""
+    xyz = bars(0.15, 0.08, 0.042, GAUGE_M + WIDTH_M + wider_m, noise_m=0.008)
+    assert found_m(xyz).paired_m == pytest.approx(2 * SIDE_M * found, rel=0.1)
+
+
+@pytest.mark.parametrize(("width_m", "blur_m"), [(0.25, 0.045), (0.3, 0.085)])
+def test_walls_at_the_distance_of_rails_are_too_wide(width_m, blur_m):
+    figures = found_m(bars(width_m, 0.15, blur_m))
+    assert figures.paired_m + figures.single_m == 0
+
+
+def lines_beside(across_m):
+    """Cells of a line along x, 4 cm apart, with their axes aside."""
+    along_m = 0.04 * np.arange(len(across_m))
+    same = np.zeros(len(along_m))
+    return Lines(np.column_stack([along_m, across_m]), same + 0.15, same, same + 1.0, same + 1.0, 1.0)
+
+
+def test_axes_that_scatter_are_steadied():
+    scattered = np.random.RandomState(5).uniform(-0.035, 0.035, 200)
+    across_m = steadied(lines_beside(scattered)).axis[:, 1]
+    assert across_m.std() < scattered.std() / 3
+
+
+def test_axes_stay_where_another_rail_begins():
+    """Two rails side by side, a guard rail's distance apart, keep their axes."""
+    both = [lines_beside(np.full(50, across_m)) for across_m in (0.0, 0.11)]
+    axis = np.concatenate([one.axis for one in both])
+    lines = Lines(axis, *(np.concatenate([getattr(one, name) for one in both]) for name in FIELDS), 1.0)
+    np.testing.assert_allclose(steadied(lines).axis, axis, rtol=0, atol=1e-12)
+
+
+def test_bars_too_wide_for_either_way_do_not_say_in_which_way_to_search():
+    """Ridges that images blur a little are steep, and too wide for heads of a sharp cloud."""
+    steep = found_m(bars(0.125, 0.15, 0.01), Way.SHARP)
+    assert steep.paired_m == steep.unsure_m == 0
+    narrow = found_m(bars(0.095, 0.15, 0.004, noise_m=0.001), Way.SHARP)
+    assert narrow.paired_m > 30.0
+    assert narrow.unsure_m == pytest.approx(narrow.paired_m)
