@@ -45,20 +45,24 @@ def lines_of(path):
 
 @pytest.mark.skipif(not find_spec("rasterio"), reason="needs the packages of the cluster")
 def test_the_command_writes_what_qgis_writes(run, run_step, write_cloud, track, tmp_path):
+    """Two strips, 20 mm apart across and 8 mm in height, are aligned, and there is a finding."""
     points = track()
-    points = points[(points[:, 1] < 3_000_000) | (np.abs(points[:, 0] - 500_007) > 1)]  # a finding
+    strips = 7 + np.arange(len(points)) % 2
+    points[strips == 8] += [0.0, 0.020, 0.008]
+    kept = (points[:, 1] < 3_000_000) | (np.abs(points[:, 0] - 500_007) > 1)
+    points, strips = points[kept], strips[kept]
     west, south = points[:, :2].min(axis=0) + [3.0, -5.0]
     east, north = points[:, :2].max(axis=0) + 5.0
-    cloud, suffixes = write_cloud(points), {"CLEANED": "tif", "REPORT": "html"}
+    cloud, suffixes = write_cloud(points, strips=strips), {"CLEANED": "tif", "REPORT": "html"}
     mine, theirs = (
         {name: tmp_path / f"{who}_{name.lower()}.{suffixes.get(name, 'gpkg')}" for name in ALL_OUTPUTS}
         for who in ("qgis", "command")
     )
     settings = {"INPUT": cloud, "ITERATIONS": 1, "ENGINE": "OPENCV", "EXTENT": f"{west},{east},{south},{north}"}
-    settings["MODEL"] = "fast"
+    settings |= {"MODEL": "fast", "STRIPS": "ALIGNED"}
     assert run({**settings, **mine}).ok
     words = ["extract", cloud, "--iterations", "1", "--engine", "OPENCV", f"--extent={west},{south},{east},{north}"]
-    words += ["--model", "fast"]
+    words += ["--model", "fast", "--strips", "ALIGNED"]
     words += [word for name, path in theirs.items() for word in (f"--{name.lower()}", path)]
     told = subprocess.run([sys.executable, "-m", "rail_extract", *words, "--workers", "1"], capture_output=True)
     assert told.returncode == 0, told.stderr

@@ -49,3 +49,15 @@ def test_both_rails_get_their_class_from_a_seed_in_degrees(raw, run_step, tmp_pa
     ends = [stop.geometry().constGet() for stop in stops]
     assert sorted(end.x() for end in ends) == pytest.approx([500_000, 500_014], abs=1.0)
     assert [end.y() for end in ends] == pytest.approx([3_000_000 + SPACING_M / 2] * 2, abs=0.02)
+    assert [end.y() for end in ends] == pytest.approx([3_000_000 + SPACING_M / 2] * 2, abs=0.02)
+
+
+def test_one_rail_grows_from_a_place_on_the_map(raw, run_step):
+    x, y = place(7.0, -SPACING_M / 2)
+    values = {"INPUT": raw, "SEED": f"{x},{y} [EPSG:32643]", "BOTH": False, "CONTENT": 1, "OUTPUT": "TEMPORARY_OUTPUT"}
+    done = run_step("growrailpoints", values)
+    assert done.ok, done.error
+    cloud = laspy.read(done.results["OUTPUT"])
+    assert len(cloud.points) == done.results["RAIL_POINTS"]
+    assert np.abs(cloud.y - y).max() < 0.06
+    assert done.results["SINGLE_LENGTH"] == pytest.approx(13.5, abs=1)
