@@ -25,6 +25,7 @@ from rail_extract.core.clouds.points import ask
 from rail_extract.core.errors import Cancelled
 from rail_extract.core.progress import Progress
 from rail_extract.core.run.loop import Runner
+from rail_extract.laboratory.curves import Element
 from rail_extract.laboratory.scenes import clearance as scenes
 from scipy.ndimage import gaussian_filter1d
 from scipy.spatial import cKDTree
@@ -154,10 +155,10 @@ class Cancelling(Progress):
 
 def cancel() -> None:
     """Print how long a run takes to end after it was cancelled, at moments from its start to its end."""
-    scene = scenes.double_track(1, MANY_PER_M2, apart_m=4.5)
+    scene = scenes.double_track(1, MANY_PER_M2, (Element(100.0),), 0.0, apart_m=4.5)
     scenes.bed(scene)
     for side in (1, -1):
-        scenes.wall(scene, (5.0, 240.0), side, HALF_M - 0.02, (0.2, 6.0))
+        scenes.wall(scene, (1.0, 99.0), side, HALF_M - 0.02, (0.2, 6.0))
     courses = _courses(scene, scene.rng)
     with TemporaryDirectory() as folder:
         path = Path(folder) / "cloud.laz"

@@ -11,6 +11,8 @@ import numpy as np
 from scipy.ndimage import label
 from scipy.spatial import cKDTree
 
+from ..polyline import POINTS_AT_ONCE
+from ..progress import Progress
 from .frame import Course
 from .settings import AROUND_M, Settings
 from .surface import ALONG_M, DEEPEST, Surface, surface_of
@@ -99,7 +101,12 @@ class Part:
 
 
 def parts_of(
-    points: Points, nodes: np.ndarray, courses: Sequence[Course], ends: tuple[float, float], settings: Settings
+    points: Points,
+    nodes: np.ndarray,
+    courses: Sequence[Course],
+    ends: tuple[float, float],
+    settings: Settings,
+    progress: Progress,
 ) -> list[Part]:
     """Return the parts of objects in a section, which ends at two chainages.
 
@@ -109,8 +116,7 @@ def parts_of(
     inside = np.flatnonzero(near.depth > 0)
     if not len(inside):
         return []
-    reach, _ = cKDTree(near.place).query(near.place[inside], k=[TOGETHER], distance_upper_bound=TOGETHER_M)
-    inside = inside[np.isfinite(reach[:, 0])]
+    inside = _together(near.place, inside, progress)
     found = []
     for kind in np.unique(near.kind[inside]).tolist():
         mine = inside[near.kind[inside] == kind]
@@ -119,6 +125,7 @@ def parts_of(
         at_seam = np.abs(near.place[mine, :1] - ends).min(axis=1) <= SEAM_M
         is_live = away(nodes, near.place[mine]) <= LIVE_M
         spaces = spaces_of(near.place[mine], courses)
+        progress.check()
         for one in np.unique(labels[near.is_own[mine]]).tolist():
             which = (labels == one) & near.is_own[mine]
             own = near.kept(mine[which])
@@ -131,11 +138,22 @@ def parts_of(
                     codes=Counter(dict(enumerate(np.bincount(own.code, own.number).astype(int).tolist()))),
                     in_spaces=Counter({track: int(own.number[inner[which]].sum()) for track, inner in spaces.items()}),
                     is_live=bool(is_live[which].any()),
-                    surfaces=tuple(_surfaces(near, mine[which], courses[0], settings)),
+                    surfaces=tuple(_surfaces(near, mine[which], courses[0], settings, progress)),
                     seam=frozenset((kind, *cell) for cell in cells[at_seam & (labels == one)].tolist()),
                 )
             )
     return found
+
+
+def _together(place: np.ndarray, inside: np.ndarray, progress: Progress) -> np.ndarray:
+    """Return those of some points, given by their numbers, (k,), that have others of all, (n, 3), around them."""
+    tree = cKDTree(place)
+    found = [np.empty(0, dtype=np.int64)]
+    for some in np.array_split(inside, len(inside) // POINTS_AT_ONCE + 1):
+        progress.check()
+        away, _ = tree.query(place[some], k=[TOGETHER], distance_upper_bound=TOGETHER_M)
+        found.append(some[np.isfinite(away[:, 0])])
+    return np.concatenate(found)
 
 
 def labelled(cells: np.ndarray) -> np.ndarray:
@@ -148,7 +166,9 @@ def labelled(cells: np.ndarray) -> np.ndarray:
     return found[tuple((cells - low).T)]
 
 
-def _surfaces(near: Points, own: np.ndarray, course: Course, settings: Settings) -> Iterator[Surface]:
+def _surfaces(
+    near: Points, own: np.ndarray, course: Course, settings: Settings, progress: Progress
+) -> Iterator[Surface]:
     """Yield the surfaces of the pieces of a part that may be its deepest."""
     window = np.floor(near.place[own][:, [0, 2]] / WINDOW_M).astype(np.int64)
     order = np.lexsort((-near.depth[own], window[:, 1], window[:, 0]))
@@ -156,6 +176,7 @@ def _surfaces(near: Points, own: np.ndarray, course: Course, settings: Settings)
     pieces = [own[some] for some in np.split(order, borders)]
     third = np.array([near.depth[some[min(2, len(some) - 1)]] for some in pieces])
     for some in (pieces[at] for at in np.flatnonzero(third >= third.max() - HOPELESS_SIGMAS * course.noise_m)):
+        progress.check()
         centre = np.median(near.place[some[:DEEPEST]], axis=0)
         i, j = np.searchsorted(near.place[:, 0], (centre[0] - ALONG_M, centre[0] + ALONG_M))
         inward = settings.outline.inward(centre[1:])

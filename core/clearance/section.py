@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..progress import SILENT, Progress
 from ..run.tasks import Context
 from ..tiles.store import read_stored
 from .frame import Course
@@ -25,6 +26,9 @@ THIRD = 3
 
 MOST_POINTS = 2_000_000
 """Points of a section above which only the deepest of each cell of a centimetre is kept, with their number."""
+
+PIECE_M = 10.0
+"""Length of the pieces in which points are put in order, so that a run is cancelled between them."""
 
 FINE_M = 0.01
 """Side of these cells: a surface that is fitted has hundreds of them."""
@@ -58,23 +62,30 @@ def measure_section(
     Given are the track and those around it, and the files of the section before, the section, and the one after it.
     """
     course, ends = courses[0], (section * SECTION_M, (section + 1) * SECTION_M)
-    points = read_points(course, section, files, settings)
+    points = read_points(course, section, files, settings, context.progress)
     context.progress.check()
     is_vehicle = own_vehicle(points.place)
     points = points.kept(~is_vehicle)
+    context.progress.check()
     nodes = nodes_of(points.place, course)
     context.progress.check()
     edges = edges_of(points.place)
     context.progress.check()
     points.kind[on_platforms(edges, points.place)] = PLATFORM
     points.kind[away(nodes, points.place) <= LIVE_M / 2] = WIRE
-    parts = parts_of(points, nodes, courses, ends, settings)
+    parts = parts_of(points, nodes, courses, ends, settings, context.progress)
     edges, nodes = (one[(one[:, 0] >= ends[0]) & (one[:, 0] < ends[1])] for one in (edges, nodes))
-    least = least_of(points.kept(points.is_own & (points.kind != WIRE)), settings)
-    return Section(*least, edges, nodes, parts, bool(is_vehicle.any()))
+    beside = points.kept(points.is_own & (points.kind != WIRE))
+    context.progress.check()
+    aside = least_of(beside, np.abs(beside.place[:, 1]), settings)
+    context.progress.check()
+    margin = least_of(beside, -beside.depth, settings)
+    return Section(aside, margin, edges, nodes, parts, bool(is_vehicle.any()))
 
 
-def read_points(course: Course, section: int, files: Sequence[Sequence[str]], settings: Settings) -> Points:
+def read_points(
+    course: Course, section: int, files: Sequence[Sequence[str]], settings: Settings, progress: Progress = SILENT
+) -> Points:
     """Read the points of a section with its halo, in an order that does not depend on the files."""
     columns = []
     for off, own in zip((-1, 0, 1), files):
@@ -84,11 +95,17 @@ def read_points(course: Course, section: int, files: Sequence[Sequence[str]], se
         is_own = np.full(int(near.sum()), off == 0)
         columns.append((s[near] + section * SECTION_M, *(stored[name][near] for name in ("v", "w", "code")), is_own))
     s, v, w, code, is_own = (np.concatenate(column) for column in zip(*columns))
-    order = np.lexsort((code, w, v, s))
-    place = np.column_stack([s, v.astype(float), w.astype(float)])[order]
-    depth, nothing = settings.depth(course, place), np.full(len(s), OTHER, dtype=np.int8)
-    points = Points(place, depth, code[order], is_own[order], nothing, np.ones(len(s), dtype=np.int64))
-    return points if len(s) <= MOST_POINTS else _thinned(points)
+    piece = np.floor(s / PIECE_M).astype(np.int64)
+    order = np.argsort(piece, kind="stable")
+    parts = []
+    for some in np.split(order, np.flatnonzero(np.diff(piece[order])) + 1):
+        progress.check()
+        some = some[np.lexsort((code[some], w[some], v[some], s[some]))]
+        place = np.column_stack([s[some], v[some].astype(float), w[some].astype(float)])
+        alone, others = np.ones(len(some), dtype=np.int64), np.full(len(some), OTHER, dtype=np.int8)
+        points = Points(place, settings.depth(course, place), code[some], is_own[some], others, alone)
+        parts.append(points if len(s) <= MOST_POINTS else _thinned(points))
+    return Points(*(np.concatenate(column) for column in zip(*(vars(one).values() for one in parts))))
 
 
 def _thinned(points: Points) -> Points:
@@ -102,13 +119,13 @@ def _thinned(points: Points) -> Points:
     return replace(points.kept(order[first][rank]), number=count[rank])
 
 
-def least_of(points: Points, settings: Settings) -> tuple[Least, Least]:
-    """Return the least distances and margins of each station, side and band."""
+def least_of(points: Points, value: np.ndarray, settings: Settings) -> Least:
+    """Return the least values of points, (n,), in each station, side and band."""
     s, v, w = points.place.T
     band = np.searchsorted(BANDS_M, w)
     counts = (w >= settings.outline.floor_m) & (band < len(BANDS_M))
     cell = 2 * len(BANDS_M) * np.rint(s / settings.step_m).astype(np.int64) + len(BANDS_M) * (v < 0) + band
-    return least_three(cell[counts], np.abs(v[counts])), least_three(cell[counts], -points.depth[counts])
+    return least_three(cell[counts], value[counts])
 
 
 def least_three(cell: np.ndarray, value: np.ndarray) -> Least:
