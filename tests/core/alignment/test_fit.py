@@ -61,6 +61,29 @@ def test_cant_that_waves_by_less_than_a_survey_shows_has_the_elements_of_its_clo
     np.testing.assert_allclose([part.cant_from_m for part in found.cant], [0, 0, -0.08, -0.08, 0], atol=0.0006)
 
 
+@pytest.mark.parametrize("seed", [1, 2])
+def test_short_waves_of_a_smoothed_line_are_not_taken_for_elements(seed):
+    smooth = surveyed(design(), np.random.default_rng(seed), 0.00003, 0.0004, 6.0)[::3]
+    found = fit(Track(1, smooth, NONE, np.zeros(len(smooth), dtype=bool))).alignment
+    assert len(found.plan) == len(SHAPES)
+    assert len(found.vertical) == 3
+
+
+def test_a_straight_stays_one_element():
+    straight = Alignment(1, FRAME, chained((0.0, 0.0), 1.0, [(400.0, 0, 0)]), (VerticalElement(0, 400, 0, 0, 0),))
+    counts = [len(fit(track(straight, seed, white_m=0.004)).alignment.plan) for seed in range(10)]
+    assert sum(count == 1 for count in counts) >= 9
+
+
+@pytest.mark.parametrize("step", [5, 25])
+def test_a_line_with_few_vertices_gives_a_curve_that_follows_it(step):
+    whole = design()
+    s = np.append(np.arange(0.0, 520.0, step), 520.0)
+    found = fit(Track(1, whole.xyz(s), NONE, np.zeros(len(s), dtype=bool))).alignment
+    off = found.foot(whole.places(np.arange(2.0, 518.0))).across_m
+    assert np.abs(off).max() < 0.002 * step
+
+
 def test_turnouts_have_jumps_unless_clothoids_are_required():
     siding = design([(80.0, 0, 0), (60.0, 1 / 300, 1 / 300), (80.0, 0, 0), (60.0, -1 / 300, -1 / 300), (80.0, 0, 0)])
     found = fit(track(siding)).alignment

@@ -26,6 +26,7 @@ from rail_extract.core.fields import FINDING_FIELDS, QUALITY_FIELDS, RAIL_FIELDS
 from rail_extract.core.pipeline import Parameters, extract_files, extract_rails  # noqa: E402
 from rail_extract.core.report import Origin  # noqa: E402
 from rail_extract.core.standards import STANDARDS  # noqa: E402
+from rail_extract.laboratory.scenes.las import write_las  # noqa: E402
 
 STANDARD = STANDARDS["EN_60E1_1435"]
 FAST = ["--iterations", "1", "--square-tiles", "4", "--engine", "OPENCV"]
@@ -141,6 +142,14 @@ def test_rails_without_a_track_are_written_and_the_reason_is_named(tiles, schedu
     assert main([*words, *scheduler]) == INCOMPLETE
     assert "No track of 1600 mm gauge" in capsys.readouterr().err
     assert len(values(out, "rails")["rail_id"]) == 2
+
+
+def test_a_raw_cloud_without_rails_is_searched_and_said(tmp_path, capsys):
+    ground = np.random.RandomState(1).uniform(0, 5, (2000, 3)) * [1, 1, 0.01]
+    cloud = write_las(tmp_path / "raw.las", ground)
+    assert main(["extract", str(cloud), "--classify", *FAST, "--rails", str(tmp_path / "rails.gpkg")]) == 1
+    assert "No rail was found in the raw cloud" in capsys.readouterr().err
+    assert [one.name for one in tmp_path.iterdir()] == ["raw.las"]
 
 
 def test_an_output_that_fails_does_not_stop_the_others(tiles, scheduler, tmp_path, monkeypatch, capsys):

@@ -217,3 +217,13 @@ def test_ends_of_thin_rails_are_cut_where_the_first_point_is_expected(seed):
     (rail,) = elevated(network_of(straight_line(80)), cloud_of(xyz))
     third = np.sort(xyz[:, 0])[[2, -3]]
     assert rail.length_m == pytest.approx(min(third[1] + 0.5, 80) - max(third[0] - 0.5, 0), abs=0.25)
+
+
+def test_a_rail_that_shows_one_face_is_as_high_as_its_top():
+    """The middle of what is seen of the face is about 22 mm below the top."""
+    random = np.random.default_rng(0)
+    x = np.sort(random.uniform(0, 30, 3000))
+    xyz = np.column_stack([x, random.normal(0, 0.002, 3000), 4.0 + random.uniform(-0.012, 0.012, 3000)])
+    (rail,) = elevated(network_of(straight_line(30.0)), cloud_of(xyz))
+    assert np.median(rail.xyz[:, 2]) == pytest.approx(4.022, abs=0.005)
+    assert rail.points == 3000
