@@ -20,10 +20,10 @@ from qgis.core import (
     QgsVectorFileWriter,
     QgsVectorLayer,
 )
-from rail_extract.core import pipeline
 from rail_extract.core.disk import Destination
 from rail_extract.core.errors import RailExtractError
 from rail_extract.core.frpdf import cleanup, models
+from rail_extract.core.pipeline import drawing
 from rail_extract.core.run import processes, worker
 from rail_extract.rail_extract_plugin.algorithms import base
 from rail_extract.rail_extract_plugin.dialog import parameter_values
@@ -279,12 +279,12 @@ FAULTS = {
         "output of an earlier run, open in another program": open_elsewhere,
         "output of an earlier run, being edited in another program": edited_elsewhere,
         "shapefile of an earlier run, with a spatial index": indexed_before,
-        "not enough memory": failing(pipeline, "clean_square", MemoryError()),
+        "not enough memory": failing(drawing, "clean_square", MemoryError()),
         "unforeseen error in the search for packages": failing(base, "missing_packages", OSError("gone")),
         "unforeseen error in the check of the values": failing(base, "check_values", ZeroDivisionError("by 0")),
-        "unforeseen error in the run": failing(pipeline, "clean_square", OverflowError("too large")),
-        "unforeseen error that is not an Exception": failing(pipeline, "clean_square", Panic("two\nlines")),
-        "unforeseen error that ends programs": failing(pipeline, "clean_square", SystemExit(3)),
+        "unforeseen error in the run": failing(drawing, "clean_square", OverflowError("too large")),
+        "unforeseen error that is not an Exception": failing(drawing, "clean_square", Panic("two\nlines")),
+        "unforeseen error that ends programs": failing(drawing, "clean_square", SystemExit(3)),
         "cancelled at 0 %": cancelled(cloud, 0),
         "cancelled at 20 %": cancelled(cloud, 20),
         "cancelled at 40 %": cancelled(cloud, 40),
@@ -323,7 +323,7 @@ def test_the_traceback_of_an_unforeseen_error_goes_into_the_log(run_step, bench)
     logged = []
     log = QgsApplication.messageLog()
     log.messageReceived[str, str, Qgis.MessageLevel].connect(lambda *message: logged.append(message))
-    run_step("extractrails", {**failing(pipeline, "clean_square", Panic("here"))(bench), "RAILS": "memory:"})
+    run_step("extractrails", {**failing(drawing, "clean_square", Panic("here"))(bench), "RAILS": "memory:"})
     (text,) = [text for text, tab, _ in logged if tab == "Rail Extract"]
     assert text.startswith("Traceback")
     assert text.endswith("Panic: here\n")
