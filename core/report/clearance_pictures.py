@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ..clearance.along import Trace
 from ..clearance.intrusions import PLATFORM_WORDS, Intrusion
 from ..clearance.measure import Clearance, Stations
 from ..clearance.section import BANDS_M
@@ -18,8 +19,8 @@ from .plots import LEFT, PANEL, RIGHT, SPACE, WIDTH, Curve, Frame, Panel, Shade,
 MOST_MM = 500.0
 """Margins above do not matter: the diagram ends there."""
 
-STRIP = 9.0
-"""Height of a row of the heat strip, in units of the picture."""
+BAR = 5.0
+"""Height of the bar of a platform, in units of the picture."""
 
 HEAT = ((0.0, "#d62839"), (50.0, "#f28e2b"), (150.0, "#e9d66b"), (400.0, "#9fd0a8"))
 """Colours of margins in millimetres below the number; above, and where nothing is seen, the strip is empty."""
@@ -52,7 +53,7 @@ def diagram(found: Clearance, number: int) -> str:
         low = -min(max(deepest, -float(np.nanmin(np.append(margin, 0.0)))), MOST_MM)
         panel = Panel(
             f"Least margin on the {side}",
-            "[mm]; red: inside, hollow: in doubt, grey: allowed",
+            "[mm]; red: inside, hollow: in doubt, grey: allowed, bar: platform",
             [Curve(*broken(stations.s, margin, 1.5 * found.settings.step_m))],
             50.0,
             floor=low - 20.0,
@@ -62,7 +63,8 @@ def diagram(found: Clearance, number: int) -> str:
         marks = [_mark(frame, one) for one in mine if (one.v_mm > 0) == (sense > 0)]
         zero = float(frame.y(0.0))
         line = tag("line", x1=LEFT, x2=WIDTH - RIGHT, y1=zero, y2=zero, style="stroke: var(--offgauge)")
-        drawn.append(panel.draw(frame, shades) + line + "".join(marks))
+        edges = [one for one in found.platforms if (one.course, one.side) == (number, sense)]
+        drawn.append(panel.draw(frame, shades) + line + "".join([*(_edge(frame, one) for one in edges), *marks]))
     drawn.append(_strip(stations, along, bottom_of(2) + SPACE))
     return section(
         f"Track {course.track_id}", picture(f"Clearance of track {course.track_id}", drawn, along, "chainage [m]")
@@ -82,6 +84,14 @@ def _mark(frame: Frame, one: Intrusion) -> str:
             "rect", tag("title", text(title)), x=start, y=y - 2, width=max(end - start, 2.0), height=4, style=style
         )
     return tag("circle", tag("title", text(title)), cx=float(frame.x(one.chainage_m)), cy=y, r=4, style=style)
+
+
+def _edge(frame: Frame, one: Trace) -> str:
+    """Draw the extent of a platform at the foot of a panel."""
+    start, end = (float(frame.x(place)) for place in one.ends)
+    words = f"platform, {1000 * abs(one.v.mean()):,.0f} mm aside and {1000 * one.w.mean():,.0f} mm high"
+    place = {"x": start, "y": float(frame.y(frame.limits[0])) - BAR, "width": max(end - start, 2.0), "height": BAR}
+    return tag("rect", tag("title", text(words)), **place, style="fill: var(--ink); opacity: 0.5")
 
 
 def _unseen(found: Clearance, stations: Stations) -> Iterator[Shade]:

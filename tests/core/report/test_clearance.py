@@ -7,6 +7,7 @@ from rail_extract.core.clearance.profiles import named
 from rail_extract.core.clearance.settings import Settings
 from rail_extract.core.clouds.points import ask
 from rail_extract.core.report.clearance import clearance_page, summary, verdict
+from rail_extract.core.report.clearance_pictures import diagram
 from rail_extract.core.report.clearance_slices import slices
 from rail_extract.core.run.loop import Runner
 from rail_extract.laboratory.curves import Element
@@ -43,6 +44,15 @@ def test_free(measured):
     assert kind == "good"
     assert words.startswith("Free. The least margin is ")
     assert 80 < 1000 * found.least_margin_m < 100
+
+
+def test_the_diagram_shows_platforms_on_their_side(tmp_path):
+    scene = scenes.double_track(1, 400.0, (Element(60.0),), 0.0, 0.0, apart_m=0)
+    scenes.platform(scene, (10.0, 50.0), -1, 1.70, 0.55)
+    scenes.write_points(tmp_path / "cloud.laz", scene.points, scene.codes)
+    given = ask(tmp_path / "cloud.laz", range(256)), scenes.courses_of(scene), Settings(named()["EBO_G1"])
+    left, right = diagram(measure(*given, tmp_path / "work", Runner()), 0).split("Least margin on the right")
+    assert "platform, 1,700 mm aside and 550 mm high" in right and "platform, " not in left
 
 
 def test_nothing_beside_the_track(measured):
