@@ -10,6 +10,7 @@ import numpy as np
 from ..classify.ways import blunt_among
 from ..errors import RailExtractError
 from ..frpdf.models import choose
+from ..heads.sections import MIN_SECTION_POINTS
 from ..heads.strips import rows_of
 from ..parameters import Parameters
 from ..progress import Progress, counted
@@ -67,7 +68,11 @@ def drawn(
         judged.append(source)
         any_square |= bool(parts) or not squares
         strips += [rows_in_frame(part, source.frame) for part in parts]
-        found = whole_rails(_released(parts), source.frame, parameters, len(rails) + 1, share) if parts else []
+        found: list[RailLine] = []
+        if parts:
+            is_searched = points.search is not None and not any(part.blunt for part in parts)
+            least_points = MIN_SECTION_POINTS if is_searched else 0
+            found = whole_rails(_released(parts), source.frame, parameters, len(rails) + 1, share, least_points)
         alone = " that only blunt points show" if source.fills else ""
         share.info(f"Class {code}: {lengths_of(found, 'rail')}{alone}.")
         rails += [replace(rail, fills=source.fills) for rail in found]

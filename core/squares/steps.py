@@ -26,7 +26,7 @@ from ..lines.finishing import finished
 from ..lines.network import LineNetwork
 from ..lines.smoothing import smooth_network
 from ..parameters import ALIGNED, Parameters
-from ..progress import SILENT, Progress
+from ..progress import SILENT, Progress, counted
 from ..rails import RailLine
 from ..raster import TILE, RailRaster, cell_size, rasterize
 from ..tiles.grid import HALO_M, OVERLAP_M, Key, PointSource, Square, around
@@ -125,13 +125,22 @@ def whole_rails(
     parameters: Parameters,
     first_id: int = 1,
     progress: Progress = SILENT,
+    least_points: int = 0,
 ) -> list[RailLine]:
     """Join the rails of all squares, drop the short ones, cut turns too sharp for a rail, simplify and number them.
 
-    Results that are let go of once they were yielded save a third of the memory of a long railway.
+    Rails with fewer than `least_points` on their heads are left out. Results that are let go of once they were yielded
+    save a third of the memory of a long railway.
     """
     rails = [rail for rail in join(results, frame) if rail.length_m >= parameters.min_length_m]
-    return _numbered(numbered(rails), parameters, first_id, progress)
+    shown = [rail for rail in rails if rail.points >= least_points]
+    if len(shown) < len(rails):
+        unshown_m = sum(rail.length_m for rail in rails) - sum(rail.length_m for rail in shown)
+        progress.info(
+            f"Left out: {counted(len(rails) - len(shown), 'line')}, {unshown_m:,.0f} m, with fewer than {least_points} "
+            "points on the head, too few to show one."
+        )
+    return _numbered(numbered(shown), parameters, first_id, progress)
 
 
 def lines_of(

@@ -4,13 +4,23 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from built import source_of
+from built import rails_of, source_of
 from rail_extract.core.clouds.points import RailPoints
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.frpdf.cleanup import clean
 from rail_extract.core.parameters import Parameters
 from rail_extract.core.raster import TILE, cell_size, rasterize
-from rail_extract.core.squares.steps import assembled, clean_square, engine_for, merged, mosaic, own_tiles, square_side
+from rail_extract.core.squares.seams import trim
+from rail_extract.core.squares.steps import (
+    assembled,
+    clean_square,
+    engine_for,
+    merged,
+    mosaic,
+    own_tiles,
+    square_side,
+    whole_rails,
+)
 from rail_extract.core.standards import STANDARDS
 from rail_extract.core.tiles.grid import Filling, MemorySource, Square, lay_out, parted
 
@@ -86,3 +96,14 @@ def test_rasters_of_both_parts_of_a_class_are_one():
     whole = rasterize(points.xyz - zero, CELL)
     places = np.sort(merged(*rasters).to_local(merged(*rasters).cells()), axis=0)
     np.testing.assert_allclose(places, np.sort(whole.to_local(whole.cells()) + zero[:2], axis=0), atol=1e-6)
+
+
+def test_lines_with_too_few_points_to_show_a_head_are_left_out():
+    parameters = Parameters(STANDARD.gauge_m, STANDARD.head_width_m)
+    rails = [
+        replace(rail, points=points)
+        for rail, points in zip(rails_of(*(np.array([[0.0, y], [30.0, y]]) for y in (0.0, 5.0, 10.0))), (249, 250, 900))
+    ]
+    parts = [trim(rails, Square((0, 0), FRAME, np.inf))]
+    assert [rail.points for rail in whole_rails(parts, FRAME, parameters, least_points=250)] == [250, 900]
+    assert [rail.points for rail in whole_rails(parts, FRAME, parameters)] == [249, 250, 900]
