@@ -161,7 +161,7 @@ def _result(found: Clearance, worst: Sequence[Slice], axes: PlacedAxes | None, s
 
     from ..files.clearance import clearance_makers
     from ..report.clearance import clearance_page, summary
-    from .result import Result, ShownCloud
+    from .result import Result, ShownCloud, ShownProfile
 
     least_m = found.least_margin_m
     figures = {
@@ -172,6 +172,8 @@ def _result(found: Clearance, worst: Sequence[Slice], axes: PlacedAxes | None, s
         "POINT_COUNT": found.point_count,
     }
     source = values.cloud("POINTS").paths[0].resolve().name
+    profile, margin_m = found.settings.profile, found.settings.margin_m
+    spacing_m = {one.track_id: float(np.median(one.spacing_m)) for one in found.courses}
     return Result(
         figures,
         found.frame,
@@ -182,7 +184,7 @@ def _result(found: Clearance, worst: Sequence[Slice], axes: PlacedAxes | None, s
             )
         },
         tuple(summary(found)),
-        ShownCloud("POINTS", tuple(range(256)), 0.07),
+        ShownCloud("POINTS", tuple(range(256)), 0.07, ShownProfile(profile.name, profile.points, margin_m, spacing_m)),
         found=found,
     )
 

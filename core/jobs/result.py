@@ -24,12 +24,26 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
+class ShownProfile:
+    """The profile of a run: its name, v and w of its ring, its margin, and how far both rails are apart, by track."""
+
+    name: str
+    points: tuple[tuple[float, float], ...]
+    margin_m: float
+    spacing_m: Mapping[int, float]
+
+
+@dataclass(frozen=True)
 class ShownCloud:
-    """The points of a run, which its layers remember: the parameter of the cloud, classes, and width of the heads."""
+    """The points of a run, which its layers remember: the parameter of the cloud, classes, and width of the heads.
+
+    `profile` is what was swept through them, if anything.
+    """
 
     name: str
     class_codes: tuple[int, ...]
     head_width_m: float
+    profile: ShownProfile | None = None
 
 
 FORMATS = (".gpkg", ".dxf", ".csv")

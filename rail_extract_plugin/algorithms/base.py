@@ -41,7 +41,7 @@ from ..setup.dependencies import explain_missing, missing_packages
 from ..writing.destinations import PAGE, appends, check_layer_name, check_page_name, destinations
 from ..writing.layers import layer_writers, write_raster
 from ..writing.reports import write_shown
-from ..writing.run import new_run, properties_of
+from ..writing.run import new_run, properties_of, properties_of_profile
 from ..writing.styling import NO_PROPERTIES
 from ..writing.whole_files import write_each
 from .sentences import COMMAND_LINE, sentence_for
@@ -273,6 +273,8 @@ class JobAlgorithm(RailAlgorithm):
             cloud = values.cloud(result.cloud.name)
             shown = result.cloud.class_codes, result.cloud.head_width_m
             self.remember(properties_of(cloud, *shown, result.frame))
+            if result.cloud.profile is not None:
+                self.remember(properties_of_profile(result.cloud.profile))
         for sentence in result.sentences:
             progress.info(sentence)
         writers: dict[str, Callable[[], dict[str, str]]] = {

@@ -7,12 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from qgis.PyQt.QtCore import QPointF, QRectF, QSize, Qt
-from qgis.PyQt.QtGui import QColor, QPainter, QPaintEvent, QPen, QTextOption
+from qgis.PyQt.QtGui import QColor, QPainter, QPaintEvent, QPen, QPolygonF, QTextOption
 from qgis.PyQt.QtWidgets import QSizePolicy, QWidget
 
 from .sections import REACH_M, Picture
 
 POINT, RAIL, FRAME, PAPER, SOFT = (QColor(name) for name in ("#1565c0", "#d62839", "#dfe5ec", "#ffffff", "#5d6b7a"))
+PROFILE = QColor("#2e7d4f")
 
 POINT_PX, CROSS_PX, LINE_PX, GAP_PX = 1.6, 6.0, 18.0, 6.0
 """Radius of a point, half the height of a rail's mark, height of a line of text, and space between panels."""
@@ -25,6 +26,9 @@ WHOLE_HEIGHT_M = 0.8
 
 WIDE_WIDTH_M, WIDE_HEIGHT_M, WIDE_UP_M = 7.0, 6.4, 2.6
 """Width, height and height of the middle of the whole cross-section of an object inside a profile."""
+
+KEY_PX = 24.0
+"""Length of the line before the words that say what the outline is."""
 
 MARK_PX = 7.0
 """Radius of the ring around the worst place."""
@@ -130,6 +134,8 @@ def _draw(painter: QPainter, panel: Panel, picture: Picture) -> None:
     for right, up in picture.points if picture.points is not None else ():
         painter.drawEllipse(panel.place(right, up), POINT_PX, POINT_PX)
     painter.setBrush(Qt.BrushStyle.NoBrush)
+    if picture.outline is not None:
+        _draw_outline(painter, panel, picture.outline, picture.legend)
     if picture.mark is not None:
         painter.setPen(QPen(RAIL, 2.0))
         painter.drawEllipse(panel.place(*picture.mark.tolist()), MARK_PX, MARK_PX)
@@ -146,6 +152,16 @@ def _draw(painter: QPainter, panel: Panel, picture: Picture) -> None:
     painter.setPen(QPen(SOFT))
     painter.drawText(panel.box.adjusted(6, 2, -6, 0), panel.title, QTextOption(Qt.AlignmentFlag.AlignLeft))
     painter.drawText(panel.box.adjusted(6, 2, -6, 0), _width(panel), QTextOption(Qt.AlignmentFlag.AlignRight))
+
+
+def _draw_outline(painter: QPainter, panel: Panel, outline: np.ndarray, legend: str) -> None:
+    """Draw the outline of a profile, and say at the foot of the panel, in up to two lines, what it is."""
+    painter.setPen(QPen(PROFILE, 1.6))
+    painter.drawPolyline(QPolygonF([panel.place(right, up) for right, up in outline.tolist()]))
+    foot = panel.box.adjusted(6, panel.box.height() - 2 * LINE_PX, -6, 0)
+    painter.drawLine(QPointF(foot.left(), foot.center().y()), QPointF(foot.left() + KEY_PX, foot.center().y()))
+    painter.setPen(QPen(SOFT))
+    painter.drawText(foot.adjusted(KEY_PX + 6, 0, 0, 0), legend, QTextOption(Qt.AlignmentFlag.AlignVCenter))
 
 
 def _width(panel: Panel) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,12 +12,13 @@ from qgis.core import QgsProject, QgsTask, QgsVectorLayer
 
 from ...core.errors import Cancelled, RailExtractError
 from ...core.jobs.lines import gaps_in
-from ...core.polyline import Polyline
+from ...core.polyline import Polyline, interpolate
 from ..feedback import TaskProgress
 from ..reading.layers import Row
 from ..writing.layers import vertices_of
-from ..writing.run import RUN, RunCloud, cloud_of
+from ..writing.run import RUN, RunCloud, cloud_of, profile_of
 from .findings import Review
+from .swept import Pose, Swept
 
 if TYPE_CHECKING:
     from ...core.clouds.cross_sections import CrossSection
@@ -62,7 +63,7 @@ class Picture:
 
     Points are None until they are read. A rail that is missing has no points here: it is where the line is drawn, or
     opposite to the other one. The note says what is missing, and why. The mark is the worst place of an object inside a
-    profile, whose whole cross-section is shown.
+    profile, whose whole cross-section is shown with the outline of the profile, (k, 2), and what that is, in words.
     """
 
     points: np.ndarray | None
@@ -71,6 +72,8 @@ class Picture:
     head_width_m: float
     note: str = ""
     mark: np.ndarray | None = None
+    outline: np.ndarray | None = None
+    legend: str = ""
 
 
 class Sections:
@@ -83,6 +86,8 @@ class Sections:
         is_clearance = any(one.is_intrusion for one in found)
         self._stations = _stations_of_run(self._run) if is_clearance else {}
         self.lacks_stations = is_clearance and not self._stations
+        profile = profile_of(layer)
+        self._swept = Swept(profile) if profile and self._stations else None
         self._planes: dict[int, CrossSection] = {one.feature.id(): self._plane(one) for one in found}
         self.reach_m = WIDE_M if self._stations else REACH_M
         self.points: dict[int, np.ndarray] = {}
@@ -109,10 +114,29 @@ class Sections:
         if review.is_intrusion:
             mark = plane.seen(self._line(review)[:1])[0, 1:]
             thin = None if shown is None else shown[:: max(len(shown) // MOST_DRAWN, 1)]
-            return Picture(thin, np.nan_to_num(rails), missing, width_m, self.note, mark)
+            picture = Picture(thin, np.nan_to_num(rails), missing, width_m, self.note, mark)
+            return self._with_profile(picture, review, mark)
         level = np.array([0.0, _level(rails, shown)])
         moved = None if shown is None else shown - level
         return Picture(moved, np.nan_to_num(rails - level), missing, width_m, self.note)
+
+    def _with_profile(self, picture: Picture, review: Review, mark: np.ndarray) -> Picture:
+        """Return the section of an intrusion with the profile and both rails at its worst place, if they are known."""
+        track, at_m, place_mm = review.value("track_id"), review.at_m, (review.value("v_mm"), review.value("w_mm"))
+        if self._swept is None or track not in self._swept.spacing_m or track not in self._stations:
+            return picture
+        if at_m is None or None in place_mm:
+            return picture
+        stations, spacing_m = self._stations[track], self._swept.spacing_m[track]
+        cant_m, left_m, right_m = interpolate(stations[:, 4:], stations[:, 0], np.array([at_m]))[0].tolist()
+        pose = Pose.of(cant_m, spacing_m, np.array(place_mm) / 1000, mark)
+        return replace(
+            picture,
+            rails=pose.seen(0.5 * spacing_m * np.array([[1.0, 0.0], [-1.0, 0.0]])),
+            missing=np.zeros(2, dtype=bool),
+            outline=pose.seen(self._swept.outline(left_m, right_m)),
+            legend=self._swept.legend(left_m, right_m),
+        )
 
     def gaps(self, review: Review) -> list[Gap]:
         """Return where which rail of a track has no points, within a finding."""
@@ -146,7 +170,7 @@ class Sections:
             place = self._line(review)[0]
             return cross_section_at(np.array([place, place + [1.0, 0.0, 0.0]]), 0.0)
         after = int(np.clip(np.searchsorted(stations[:, 0], at_m), 1, len(stations) - 1))
-        (start, *first), (end, *second) = stations[after - 1] * self._scale, stations[after] * self._scale
+        (start, *first), (end, *second) = stations[after - 1 : after + 1, :4] * self._scale
         return cross_section_at(np.array([first, second]), float((at_m - start) / (end - start)))
 
     @property
@@ -234,14 +258,19 @@ def _crossings(rail: Rail, plane: CrossSection) -> tuple[np.ndarray, np.ndarray]
 
 
 def _stations_of_run(run: str | None) -> dict[int, np.ndarray]:
-    """Return chainage, x, y and z of the stations of the clearance of a run, (n, 4), by track."""
+    """Return the stations of the clearance of a run, (n, 7), by track.
+
+    They have chainage, x, y, z, cant, and the widening on the left and on the right; the last three are metres, 0 where
+    the layer states none.
+    """
     found: dict[int, list[list[float]]] = {}
     for layer in QgsProject.instance().mapLayers().values():
         is_mine = run and layer.customProperty(RUN) == run and isinstance(layer, QgsVectorLayer)
         if is_mine and layer.fields().lookupField("lmar_mm") >= 0:
             for feature in layer.getFeatures():
-                place = [feature["chainage_m"], *vertices_of(feature)[0]]
-                found.setdefault(feature["track_id"], []).append(place)
+                row = Row(feature)
+                across = ((row[name] or 0.0) / 1000 for name in ("cant_mm", "wide_l_mm", "wide_r_mm"))
+                found.setdefault(row["track_id"], []).append([row["chainage_m"], *vertices_of(feature)[0], *across])
     return {track: np.array(sorted(rows)) for track, rows in found.items() if len(rows) > 1}
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from uuid import uuid4
@@ -19,6 +19,7 @@ from qgis.core import (
 )
 
 from ...core.jobs.clouds import CloudSource
+from ...core.jobs.result import ShownProfile
 
 if TYPE_CHECKING:
     from ...core.frame import LocalFrame
@@ -29,6 +30,9 @@ the run among those of the same algorithm and input in the project."""
 
 TOOL, SOURCE, LAYER = "rail_extract/tool", "rail_extract/source", "rail_extract/input"
 """Names of further ones: the label of the algorithm, what it was run on, in words, and the id of that layer, if any."""
+
+PROFILE = "rail_extract/profile"
+"""Name of the property that states the profile that was swept."""
 
 TABLE = "|layername="
 """What comes before the name of a table in the source of a layer."""
@@ -97,6 +101,22 @@ def cloud_of(layer: QgsMapLayer) -> RunCloud | None:
         width_m = float(facts["head_width_m"])
         return RunCloud(paths, codes, facts["crs"], width_m, (east, north, up)) if paths else None
     except (KeyError, TypeError, ValueError):
+        return None
+
+
+def properties_of_profile(profile: ShownProfile) -> dict[str, str]:
+    """Return the property that states the profile of a run."""
+    return {PROFILE: json.dumps(asdict(profile))}
+
+
+def profile_of(layer: QgsMapLayer) -> ShownProfile | None:
+    """Return the profile of the run that made a layer; None if the layer states none."""
+    try:
+        facts = json.loads(layer.customProperty(PROFILE) or "")
+        points = tuple((float(v), float(w)) for v, w in facts["points"])
+        spacing_m = {int(track): float(one) for track, one in facts["spacing_m"].items()}
+        return ShownProfile(str(facts["name"]), points, float(facts["margin_m"]), spacing_m)
+    except (AttributeError, KeyError, TypeError, ValueError):
         return None
 
 

@@ -13,6 +13,7 @@ from driver import Driver, algorithm, choose, close, install, later, open_batch,
 from qgis.core import (
     QgsApplication,
     QgsCoordinateReferenceSystem,
+    QgsGeometry,
     QgsLayerTree,
     QgsPointCloudLayer,
     QgsPointXY,
@@ -586,7 +587,7 @@ def clearance(driver: Driver) -> Iterator:
     driver.keep("dock is visible", dock.isVisible())
     yield lambda: not dock.is_reading
     dock.go(0)
-    seen: dict[str, list] = {"counts": [], "reasons": [], "marks": [], "points": []}
+    seen: dict[str, list] = {"counts": [], "reasons": [], "marks": [], "points": [], "inside": [], "legends": []}
     for press in ("accepted", "next"):
         yield 1.0
         driver.picture(f"clearance_{press}")
@@ -594,6 +595,9 @@ def clearance(driver: Driver) -> Iterator:
         seen["reasons"].append(dock.reason.text())
         seen["marks"].append(dock.view.picture.mark.tolist())
         seen["points"].append(len(dock.view.picture.points))
+        outline = QgsGeometry.fromPolylineXY([QgsPointXY(*corner) for corner in dock.view.picture.outline.tolist()])
+        seen["inside"].append(outline.distance(QgsGeometry.fromPointXY(QgsPointXY(*seen["marks"][-1]))))
+        seen["legends"].append(dock.view.picture.legend)
         dock.buttons[press].click()
     for name, values in seen.items():
         driver.keep(name, values)

@@ -202,6 +202,8 @@ def test_clearance_is_measured_and_intrusions_are_reviewed_in_the_dock(run_scena
     assert 1000 * on_straight == pytest.approx(-1615, abs=6)
     assert 1000 * in_curve == pytest.approx(-1565 - 80 * up, abs=15)  # cant leans the profile, and the picture is level
     assert min(session["points"]) > 100
+    assert [1000 * inside for inside in session["inside"]] == pytest.approx(session["depths"], abs=0.5)
+    assert session["legends"] == ["profile EBO_G1"] * 2
     assert session["decisions"] == ["accepted", ""]
 
 

@@ -4,17 +4,26 @@ import time
 
 import numpy as np
 import pytest
-from qgis.core import NULL, QgsCoordinateReferenceSystem, QgsFeature, QgsGeometry, QgsProject, QgsVectorLayer
+from qgis.core import (
+    NULL,
+    QgsCoordinateReferenceSystem,
+    QgsFeature,
+    QgsGeometry,
+    QgsPointXY,
+    QgsProject,
+    QgsVectorLayer,
+)
 from qgis.gui import QgsMapCanvas
 from qgis.PyQt.QtCore import Qt
 from qgis.PyQt.QtWidgets import QMainWindow
 from rail_extract.core.fields import CLEARANCE_FIELDS, FINDING_FIELDS, INTRUSION_FIELDS, RAIL_FIELDS
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.jobs.clouds import CloudSource
+from rail_extract.core.jobs.result import ShownProfile
 from rail_extract.rail_extract_plugin.review.findings import ACCEPTED, REJECTED, reviews
-from rail_extract.rail_extract_plugin.review.section_view import PAPER, POINT, RAIL
+from rail_extract.rail_extract_plugin.review.section_view import PAPER, POINT, PROFILE, RAIL
 from rail_extract.rail_extract_plugin.writing.layers import fields
-from rail_extract.rail_extract_plugin.writing.run import RUN, properties_of
+from rail_extract.rail_extract_plugin.writing.run import RUN, properties_of, properties_of_profile
 
 ZERO = LocalFrame(np.zeros(3))
 
@@ -316,6 +325,50 @@ def test_intrusions_are_stepped_through_with_the_cross_section_of_the_cloud(qgis
     assert picture.mark == pytest.approx([-1.5, 2.0], abs=1e-3)
     shown.buttons["accepted"].click()
     assert next(shown._layer.getFeatures())["review"] == "accepted"
+
+
+@pytest.mark.parametrize(("margin_m", "wide_mm"), [(0.0, 0.0), (0.1, 0.0), (0.0, 25.0), (0.1, 25.0)])
+def test_the_profile_leans_with_the_track_and_is_as_deep_around_the_object_as_stated(
+    qgis, load, project, dock, write_cloud, margin_m, wide_mm
+):
+    v, w, cant_m, spacing_m, pen_m = 1.560 + margin_m + wide_mm / 1000, 2.0, 0.150, 1.5, 0.060
+    roll = np.arcsin(cant_m / spacing_m)
+    left, up = v * np.cos(roll) - w * np.sin(roll), v * np.sin(roll) + w * np.cos(roll)
+    path = write_cloud(np.array([[500_010.0, 3_000_000 + left, 100 + up]]), class_code=1)
+    half = ((1.62, 0.4), (1.62, 4.0), (0.0, 4.0), (-1.62, 4.0), (-1.62, 0.4))
+    properties = {
+        RUN: "this run",
+        **properties_of(CloudSource((path,)), range(256), 0.07, ZERO),
+        **properties_of_profile(ShownProfile("EBO_G9", half, margin_m, {1: spacing_m})),
+    }
+    one = {"track_id": 1, "lmar_mm": -60.0, "cant_mm": 1000 * cant_m, "wide_l_mm": wide_mm, "wide_r_mm": 2 * wide_mm}
+    stations = [(x, 0.0, 0.0, {**one, "chainage_m": float(x)}) for x in range(21)]
+    add_points(project, CLEARANCE_FIELDS, stations, properties)
+    row = {"intrusion": 1, "track_id": 1, "from_m": 9.9, "to_m": 10.1, "chainage_m": 10.0, "pen_mm": 1000 * pen_m}
+    places = [(10.0, left, up, {**row, "v_mm": 1000 * v, "w_mm": 1000 * w, "sure": 1, "sigma_mm": 1.5})]
+    add_points(project, INTRUSION_FIELDS, places, properties)
+    shown = dock()
+    wait(qgis, shown)
+    picture = shown._sections.picture(shown._found[0])
+    outline = QgsGeometry.fromPolygonXY([[QgsPointXY(*corner) for corner in picture.outline]])
+    mark = QgsGeometry.fromPointXY(QgsPointXY(*picture.mark))
+    assert outline.contains(mark)
+    edge = QgsGeometry.fromPolylineXY([QgsPointXY(*corner) for corner in picture.outline])
+    assert edge.distance(mark) == pytest.approx(pen_m, abs=1e-3)
+    rise = np.array([np.cos(roll), -np.sin(roll)])
+    np.testing.assert_allclose(picture.rails, [-rise * spacing_m / 2, rise * spacing_m / 2], atol=1e-6)
+    widths = (picture.outline - picture.outline.mean(axis=0)) @ rise
+    assert np.ptp(widths) == pytest.approx(2 * 1.62 + 2 * margin_m + 3 * wide_mm / 1000, abs=1e-3)
+    words = [
+        "profile EBO_G9",
+        "margin 100 mm" if margin_m else "",
+        "widening 25 and 50 mm" if wide_mm else "",
+    ]
+    assert picture.legend == ", ".join(filter(None, words))
+    shown.view.resize(400, 400)
+    image = shown.view.grab().toImage()
+    colours = {image.pixelColor(x, y).name() for x in range(image.width()) for y in range(image.height())}
+    assert PROFILE.name() in colours
 
 
 def add_points(project, columns, rows, properties):
