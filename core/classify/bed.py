@@ -106,17 +106,18 @@ class Bed:
     planes: np.ndarray
 
     @classmethod
-    def under(cls, xyz: np.ndarray) -> tuple[Bed, np.ndarray, np.ndarray]:
+    def under(cls, xyz: np.ndarray) -> tuple[Bed, np.ndarray, np.ndarray, np.ndarray]:
         """Find the bed under points, (n, 3) metres.
 
-        Also returns their heights, (n,), above it and from a multiple of `ORIGIN_STEP` on.
+        Also returns their heights above it, the numbers of their levels, and their heights from a multiple of
+        `ORIGIN_STEP` on, (n,) each.
         """
         x, y = (np.ascontiguousarray(values) for values in xyz.T[:2])
         z = (xyz[:, 2] - ORIGIN_STEP * np.floor(xyz[:, 2].min() / ORIGIN_STEP)).astype(np.float32)
         coarse = Coarse.around(x, y)
         dx, dy = coarse.offsets(x, y)
         bed = find_bed(coarse, dx, dy, z)
-        return bed, bed.heights(dx, dy, z)[0], z
+        return (bed, *bed.heights(dx, dy, z), z)
 
     def heights(self, dx: np.ndarray, dy: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Height of each point above the highest level that is not above it, (n,), and the number of this level.

@@ -12,7 +12,7 @@ from scipy.ndimage import binary_dilation
 from scipy.sparse import csr_matrix
 from scipy.spatial import cKDTree
 
-from .bed import COARSE_M, Coarse
+from .bed import COARSE_M, MAX_LEVELS
 from .lines import Lines, Marks, find_lines
 from .partner import partners
 from .pieces import lengths, links, pieces_of
@@ -95,34 +95,22 @@ class Flush:
 NO_FLUSH = Flush(np.empty(0, dtype=np.int64), NO_LINES, NO_LINES)
 
 
-def flush_rails(
-    coarse: Coarse,
-    near: np.ndarray,
-    xy: np.ndarray,
-    height: np.ndarray,
-    grid: Grid,
-    cell: np.ndarray,
-    settings: Settings,
-) -> Flush:
-    """Find rails in pavement.
+@dataclass(frozen=True)
+class NearBed:
+    """Points near the bed: their places, (n, 2), heights above it, coarse cells and levels of the bed, (n,) each."""
 
-    Parameters
-    ----------
-    coarse : Coarse
-    near : (n,) int array
-        Numbers of the points near the bed among those of `coarse`.
-    xy, height : (n, 2) and (n,) arrays
-        Of these points; height above the bed.
-    grid : Grid
-    cell : (n,) int array
-        Cell of each of these points.
-    settings : Settings
-    """
+    xy: np.ndarray
+    height: np.ndarray
+    coarse: np.ndarray
+    level: np.ndarray
+
+
+def flush_rails(shape: tuple[int, int], near: NearBed, grid: Grid, cell: np.ndarray, settings: Settings) -> Flush:
+    """Find rails in pavement, given rows and columns of the coarse cells, and the cell of each point, (n,)."""
     head_width_m = settings.head_width_m
-    level_m = _pavement(coarse, coarse.cell[near], height)
-    if not np.isfinite(level_m).any():
+    xy, below = near.xy, _pavement(shape, near) - near.height
+    if not np.isfinite(below).any():
         return NO_FLUSH
-    below = level_m[coarse.cell[near]] - height
     hollow = np.flatnonzero((below > CAVITY_M[0]) & (below < CAVITY_M[1]))
     marks = centroids(cell[hollow], xy[hollow])
     if len(marks) < 2:
@@ -146,18 +134,22 @@ def _guided(heads: Heads, settings: Settings) -> Heads:
     return heads.of(kept)
 
 
-def _pavement(coarse: Coarse, cell: np.ndarray, height: np.ndarray) -> np.ndarray:
-    """Height of the pavement above the bed by coarse cell, (cells,); NaN where there is none."""
-    cells = len(coarse.count)
-    near = np.abs(height) < NEAR_BED_M
+def _pavement(shape: tuple[int, int], points: NearBed) -> np.ndarray:
+    """Height above the bed of the pavement at each point, (n,); NaN where the level that it belongs to is not paved.
+
+    A level of its own is a wall or the side of a vehicle, in whose points there are no grooves.
+    """
+    number = points.level * np.int64(shape[0] * shape[1]) + points.coarse
+    cells = MAX_LEVELS * shape[0] * shape[1]
+    near = np.abs(points.height) < NEAR_BED_M
     # Whole numbers add up to the same sum in any order of the points.
-    tenths = np.round(height[near] * TENTHS_OF_MM)
-    count = np.bincount(cell[near], minlength=cells)
-    level = np.bincount(cell[near], tenths, cells) / np.maximum(count, 1)
-    flat = np.bincount(cell[near][np.abs(tenths - level[cell[near]]) < LEVEL_M * TENTHS_OF_MM], minlength=cells)
-    paved = (coarse.count > MIN_PER_M2 * COARSE_M**2) & (flat > MIN_SHARE * np.bincount(cell, minlength=cells))
-    grown = binary_dilation(paved.reshape(coarse.shape), np.ones((3, 3))).ravel()
-    return np.where(grown, level / TENTHS_OF_MM, np.nan)
+    tenths, own = np.round(points.height[near] * TENTHS_OF_MM), number[near]
+    mean = np.bincount(own, tenths, cells) / np.maximum(np.bincount(own, minlength=cells), 1)
+    flat = np.bincount(own[np.abs(tenths - mean[own]) < LEVEL_M * TENTHS_OF_MM], minlength=cells)
+    count = np.bincount(number, minlength=cells)
+    paved = (count > MIN_PER_M2 * COARSE_M**2) & (flat > MIN_SHARE * count)
+    grown = binary_dilation(paved.reshape(MAX_LEVELS, *shape), np.ones((1, 3, 3))).ravel()
+    return np.where(grown, mean / TENTHS_OF_MM, np.nan)[number]
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ import numpy as np
 from ..rails import SearchFigures
 from .alone import are_solid, may_hide_partner
 from .bed import COARSE_M, Bed, Coarse
-from .flush import NO_FLUSH, Flush, flush_rails
+from .flush import NO_FLUSH, Flush, NearBed, flush_rails
 from .labels import Near, label, whole_heads
 from .lines import SINGLE_COVER, Lines, Marks, centred, find_lines, reach_at
 from .partner import are_within_gauge, have_partners, runs_inside
@@ -186,7 +186,7 @@ def classify_square(xyz: np.ndarray, settings: Settings) -> ByShape:
     nothing = ByShape(rail, SearchFigures(), Classified(rail, SearchFigures()))
     if not len(xyz):
         return nothing
-    bed, height, z = Bed.under(xyz)
+    bed, height, level, z = Bed.under(xyz)
     near = np.flatnonzero(height <= HIGH_M)
     if not len(near):
         return nothing
@@ -194,7 +194,8 @@ def classify_square(xyz: np.ndarray, settings: Settings) -> ByShape:
     grid, cell = Grid.around(xy[:, 0], xy[:, 1], settings.cell_m)
     tops = tops_of(grid, cell, height, z[near])
     standing = _standing(Shown(xy, cell, height, bed, tops), settings)
-    paved = NO_FLUSH if settings.blunt else flush_rails(bed.coarse, near, xy, height, grid, cell, settings)
+    near_bed = NearBed(xy, height, bed.coarse.cell[near], level[near])
+    paved = NO_FLUSH if settings.blunt else flush_rails(bed.coarse.shape, near_bed, grid, cell, settings)
     in_pavement = rail.copy()
     in_pavement[near[paved.points]] = True
     found = np.append(near[standing.points], near[paved.points])

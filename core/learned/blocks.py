@@ -109,7 +109,7 @@ class Block:
 
 def thin(xyz: np.ndarray) -> Thinned:
     """Find the heights above the bed and thin the points, (n, 3) as in `classify.square.classify_square`."""
-    bed, height, z = Bed.under(xyz)
+    bed, height, _, z = Bed.under(xyz)
     used = np.flatnonzero((height >= LEAST_M) & (height <= HIGH_M))
     place = np.column_stack([xyz[used, :2], z[used], height[used]]).astype(np.float32)
     railhigh = (place[:, 3] >= LOW_M) & (place[:, 3] <= TOP_M)

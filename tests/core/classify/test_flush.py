@@ -62,3 +62,15 @@ def test_grooves_are_found_as_far_from_the_scanner_as_they_hold_a_row_of_points(
     found = classify_square(xyz[few], SETTINGS).rail
     here = np.abs(turned(xyz[few], 0.3)[0]) < 3
     assert (found & on[few] & here).sum() / (on[few] & here).sum() > 0.9
+
+
+def test_the_side_of_a_vehicle_at_gauge_from_a_groove_is_no_rail():
+    """Its points, from 0.75 m up, have a level of their own, and the lowest lie below it as those of a groove do."""
+    xyz, _, inside = street(0.003, angle=0.0)
+    across = turned(xyz, 0.0)[1]
+    xyz[(inside > 0) & (inside < GROOVE) & (across < 0), 2] += DEPTH
+    rng = np.random.RandomState(4)
+    side = xyz[rng.choice(len(xyz), 40_000)]
+    side[:, 1] = xyz[0, 1] - across[0] - GAUGE / 2 + GROOVE / 2 + 0.002 * rng.standard_normal(len(side))
+    side[:, 2] = rng.uniform(0.75, 3.0, len(side))
+    assert not classify_square(np.concatenate([xyz, side]), SETTINGS).rail.any()
