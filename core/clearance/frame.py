@@ -47,37 +47,18 @@ UNKNOWN_CANT_M = 0.15
 LEAST_NOISE_M, USUAL_NOISE_M = 0.003, 0.005
 """Noise of a point: at least that of the best mobile scanners, and the usual one where the rails do not show it."""
 
-BESIDE_M = 0.5 * STEP_M
-"""A point whose foot is further along than this is nearer to another station."""
-
 
 @dataclass(frozen=True)
 class Course:
-    """A track at stations of equal distance; (n,) arrays.
+    """A track at stations of equal distance in plan, `STEP_M` or a little less; (n,) arrays.
 
-    Attributes
-    ----------
-    step_m : float
-        Distance of the stations in plan, `STEP_M` or a little less.
-    xyz : (n, 3) array
-        Stations, metres from the zero of the coordinate system.
-    heading, curvature, grade : array
-        Direction, radians; 1/m, positive to the left; slope, positive uphill.
-    cant_m, spacing_m : array
-        Left minus right rail top, 0 where there are no rails; 3D distance of both.
-    bridged : bool array
-        Where a rail has no points and its height is interpolated.
-    wide_m : (n, 2) array
-        What the profile is widened by on the left and on the right.
-    gauge_m : float
-        Measured gauge; NaN if unknown.
-    sigma_m, cant_sigma_m, noise_m : float
-        Standard errors of the line across, of the cant, and of a point. Where the cant is unknown, its error holds all
-        of it.
-    has_cant : bool
-        Whether rails give the cant.
-    first : int
-        Number of the first station along the whole line.
+    `xyz`, (n, 3), are metres from the zero of the coordinate system. Curvature, 1/m, is positive to the left, grade
+    uphill. The cant, left minus right rail top, is 0 where there are no rails; `spacing_m` is the 3D distance of both
+    tops, and the height of a rail is interpolated where it is `bridged`. `wide_m`, (n, 2), is what the profile is
+    widened by on the left and on the right.
+
+    The gauge is NaN if unknown. Standard errors are those of the line across, of the cant, and of a point; that of an
+    unknown cant holds all of it. `first` is the number of the first station along the whole line.
     """
 
     track_id: int
@@ -141,32 +122,21 @@ class Course:
         return within, station[within]
 
     def located(self, xyz: np.ndarray, station: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return s, v and w of points, (m, 3), given a station near each; s is NaN beyond the ends of the line."""
-        ahead, across = self.on_arc(xyz, station)
-        far = np.flatnonzero(np.abs(ahead) > BESIDE_M)
-        if len(far):
-            station = station.copy()
-            moved = station[far] + np.rint(ahead[far] / self.step_m).astype(np.int64)
-            station[far] = np.clip(moved, 0, len(self.xyz) - 1)
-            ahead[far], across[far] = self.on_arc(xyz[far], station[far])
-        s = (station + self.first) * self.step_m + ahead
-        grade, roll = self.grade[station], np.interp(s, self.s, self.roll)
-        up = (xyz[:, 2] - self.xyz[station, 2] - grade * ahead) / np.sqrt(1.0 + grade**2)
-        cos, sin = np.cos(roll), np.sin(roll)
-        inside = (s >= self.s[0]) & (s <= self.s[-1]) & (np.abs(ahead) <= self.step_m)
-        return np.where(inside, s, np.nan), across * cos + up * sin, up * cos - across * sin
+        """Return s, v and w of points, (m, 3), given the station nearest to each; s is NaN beyond the ends of the line.
 
-    def on_arc(self, xyz: np.ndarray, station: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return how far the feet of points are ahead of their stations, and the distances to the left, on local arcs.
-
-        Both have no cancellation and no special case where the track is straight.
+        Their feet are on the arc of the station, by formulas without a special case where the track is straight.
         """
         east, north = (xyz[:, :2] - self.xyz[station, :2]).T
         cos, sin = np.cos(self.heading)[station], np.sin(self.heading)[station]
         a, b, k = east * cos + north * sin, north * cos - east * sin, self.curvature[station]
-        u = a / (1.0 - k * b)
-        q = k * (a**2 + b**2) - 2.0 * b
-        return u * (1.0 - (k * u) ** 2 / 3.0), -q / (1.0 + np.sqrt(1.0 + k * q))
+        u, q = a / (1.0 - k * b), k * (a**2 + b**2) - 2.0 * b
+        ahead, left = u * (1.0 - (k * u) ** 2 / 3.0), -q / (1.0 + np.sqrt(1.0 + k * q))
+        s, grade = (station + self.first) * self.step_m + ahead, self.grade[station]
+        up = (xyz[:, 2] - self.xyz[station, 2] - grade * ahead) / np.sqrt(1.0 + grade**2)
+        roll = np.interp(s, self.s, self.roll)
+        cos, sin = np.cos(roll), np.sin(roll)
+        beside = (s >= self.s[0]) & (s <= self.s[-1]) & (np.abs(ahead) <= self.step_m)
+        return np.where(beside, s, np.nan), left * cos + up * sin, up * cos - left * sin
 
     def places(self, s: np.ndarray, v: np.ndarray, w: np.ndarray) -> np.ndarray:
         """Return the places of s, v and w, (m, 3) metres from the zero of the coordinate system."""

@@ -21,7 +21,6 @@ from .frame import Course
 from .intrusions import VEHICLE_WORDS, Intrusion, intrusions_of
 from .neighbours import Side, near, neighbours
 from .platforms import platforms_of
-from .profiles import NO_RULE
 from .section import BANDS_M, Section, measure_section, third_least
 from .settings import LEAVE_OUT, Settings
 from .sweep import Swept, part_of, sweep
@@ -116,7 +115,9 @@ def measure(
     request.announce(progress)
     swept = sweep(request, courses, settings, folder, runner, reading)
     progress.status("Measuring the clearance")
-    courses = [_widened(course, settings) for course in courses]
+    if settings.widening == EBO:
+        rule = settings.profile.rule
+        courses = [replace(one, wide_m=widening(one.curvature, one.gauge_m, rule, one.step_m)) for one in courses]
     found: dict[Key, Section] = dict(runner.run(_tasks(courses, swept, settings), measuring))
     tracks = [[found[key] for key in sorted(found) if key[0] == at] for at in range(len(courses))]
     objects = intrusions_of(courses, [[part for one in own for part in one.parts] for own in tracks])
@@ -133,13 +134,6 @@ def measure(
         tuple(key for key, one in sorted(found.items()) if one.has_vehicle),
         swept,
     )
-
-
-def _widened(course: Course, settings: Settings) -> Course:
-    """Return a course with the widening of the profile."""
-    if settings.widening != EBO or settings.profile.rule == NO_RULE:
-        return course
-    return replace(course, wide_m=widening(course.curvature, course.gauge_m, settings.profile.rule, course.step_m))
 
 
 def _tasks(courses: Sequence[Course], swept: Swept, settings: Settings) -> dict[Key, Task]:

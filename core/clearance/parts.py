@@ -41,20 +41,10 @@ SEAM_M = 3 * CELL_M
 
 @dataclass(frozen=True)
 class Points:
-    """Points of a section in the order of s.
+    """Points of a section in the order of s, (n, 3): s, v and w; the others are (n,).
 
-    Attributes
-    ----------
-    place : (n, 3) array
-        s, v and w.
-    depth : (n,) array
-        Penetration of the profile, margin and widening included.
-    code, kind : (n,) int array
-        Class, and what they are of, see `OTHER`.
-    is_own : (n,) bool array
-        Whether a point is in the section itself, not in the halo.
-    number : (n,) int array
-        Points of the cloud that each stands for.
+    Depth is the penetration of the profile with margin and widening, and `kind` what a point is of, see `OTHER`. Points
+    that are not the section's own are in its halo. `number` is how many points of the cloud each stands for.
     """
 
     place: np.ndarray
@@ -71,22 +61,12 @@ class Points:
 
 @dataclass(frozen=True)
 class Part:
-    """What a section shows of one object; lengths in metres.
+    """What a section shows of one object of a kind; lengths in metres.
 
-    Attributes
-    ----------
-    kind : int
-    low, high : (3,) array
-        Least and largest s, v and w of the points inside.
-    raw_m : float
-        Penetration of the deepest point.
-    codes, in_spaces : Counter
-        Points by class; and in the spaces of vehicles, by track.
-    is_live : bool
-        Whether a point is so near to the contact wire that the object is live itself.
-    surfaces : tuple of Surface
-    seam : frozenset
-        Kind and numbers of the cells by which the object continues in another section.
+    `low` and `high`, (3,), are the least and largest s, v and w of the points inside, and `raw_m` is the penetration of
+    the deepest one. Points are counted by class, and by track in the spaces of vehicles. An object is live itself if a
+    point is so near to the contact wire. `seam` has kind and numbers of the cells by which the object continues in
+    another section.
     """
 
     kind: int

@@ -99,7 +99,7 @@ def _level(aside: np.ndarray, w: np.ndarray) -> tuple[float, float, np.ndarray] 
         on_level = (layer == one) | (layer == one + 1)
         middle, slope = float(np.median(w[on_level])), 0.0
         for _ in range(ROUNDS):
-            on_level = np.abs(w - middle - slope * aside) <= LEVEL_SIGMA_M if slope or middle else on_level
+            on_level = np.abs(w - middle - slope * aside) <= LEVEL_SIGMA_M
             if on_level.sum() < LEAST_POINTS or np.ptp(aside[on_level]) < LEAST_WIDTH_M:
                 break
             slope, middle = np.polyfit(aside[on_level], w[on_level], 1).tolist()

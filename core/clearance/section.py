@@ -63,23 +63,20 @@ def measure_section(
     """
     course, ends = courses[0], (section * SECTION_M, (section + 1) * SECTION_M)
     points = read_points(course, section, files, settings, context.progress)
-    context.progress.check()
     is_vehicle = own_vehicle(points.place)
     points = points.kept(~is_vehicle)
     context.progress.check()
-    nodes = nodes_of(points.place, course)
-    context.progress.check()
-    edges = edges_of(points.place)
+    nodes, edges = nodes_of(points.place, course), edges_of(points.place)
     context.progress.check()
     points.kind[on_platforms(edges, points.place)] = PLATFORM
     points.kind[away(nodes, points.place) <= LIVE_M / 2] = WIRE
     parts = parts_of(points, nodes, courses, ends, settings, context.progress)
     edges, nodes = (one[(one[:, 0] >= ends[0]) & (one[:, 0] < ends[1])] for one in (edges, nodes))
-    beside = points.kept(points.is_own & (points.kind != WIRE))
-    context.progress.check()
-    aside = least_of(beside, np.abs(beside.place[:, 1]), settings)
-    context.progress.check()
-    margin = least_of(beside, -beside.depth, settings)
+    s, v, w = points.place.T
+    band = np.searchsorted(BANDS_M, w)
+    beside = points.is_own & (points.kind != WIRE) & (w >= settings.outline.floor_m) & (band < len(BANDS_M))
+    cell = 2 * len(BANDS_M) * np.rint(s / settings.step_m).astype(np.int64) + len(BANDS_M) * (v < 0) + band
+    aside, margin = (least_three(cell[beside], one[beside]) for one in (np.abs(v), -points.depth))
     return Section(aside, margin, edges, nodes, parts, bool(is_vehicle.any()))
 
 
@@ -117,15 +114,6 @@ def _thinned(points: Points) -> Points:
     _, first, count = np.unique(number, return_index=True, return_counts=True)
     rank = np.argsort(order[first])
     return replace(points.kept(order[first][rank]), number=count[rank])
-
-
-def least_of(points: Points, value: np.ndarray, settings: Settings) -> Least:
-    """Return the least values of points, (n,), in each station, side and band."""
-    s, v, w = points.place.T
-    band = np.searchsorted(BANDS_M, w)
-    counts = (w >= settings.outline.floor_m) & (band < len(BANDS_M))
-    cell = 2 * len(BANDS_M) * np.rint(s / settings.step_m).astype(np.int64) + len(BANDS_M) * (v < 0) + band
-    return least_three(cell[counts], value[counts])
 
 
 def least_three(cell: np.ndarray, value: np.ndarray) -> Least:

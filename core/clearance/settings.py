@@ -26,9 +26,6 @@ STORED_M, STORED_UP_M, STORED_LOW_M, STORED_STEP_M = 4.5, 7.5, 0.08, 1.5
 """Points are stored up to this distance from the track, up to this height, and from this lowest height that counts on:
 all named profiles find theirs there. Larger ones have more stored, in whole steps."""
 
-BELOW_M = 0.05
-"""How far below points are stored, as the rough height of a point is off by that."""
-
 EBO_DISTANCE_M = 4.0
 """Least distance of tracks on the open line (EBO section 10)."""
 
@@ -46,8 +43,10 @@ class Outline:
     def __init__(self, profile: Profile, floor_m: float) -> None:
         ring = np.array(profile.points)
         start, end = ring, np.roll(ring, -1, axis=0)
-        below = np.maximum(start[:, 1], end[:, 1]) <= floor_m
-        kept = ~(below | _is_foot(start, end))
+        is_below = np.maximum(start[:, 1], end[:, 1]) <= floor_m
+        height = np.where(start[:, 0] * end[:, 0] <= 0, start[:, 1] + end[:, 1], np.inf) / 2
+        is_foot = np.isfinite(height) & (height <= height.min() + SAME_M)
+        kept = ~(is_below | is_foot)
         self.start, self.step = start[kept], (end - start)[kept]
         self.floor_m = max(floor_m, float(ring[:, 1].min()))
         self._mask = Mask.of([np.vstack([ring, ring[:1]])])
@@ -74,15 +73,6 @@ class Outline:
             closer = away < best
             best[closer], number[closer] = away[closer], at
         return np.sqrt(best), number
-
-
-def _is_foot(start: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """Return which edges, (n,), cross the middle of the track at the lowest height: where the outline closes."""
-    spans = (np.minimum(start[:, 0], end[:, 0]) <= 0) & (np.maximum(start[:, 0], end[:, 0]) >= 0)
-    across = end[:, 0] - start[:, 0]
-    share = np.divide(-start[:, 0], across, out=np.zeros(len(start)), where=np.abs(across) > SAME_M)
-    height = np.where(spans, start[:, 1] + share * (end[:, 1] - start[:, 1]), np.inf)
-    return spans & (height <= height.min() + SAME_M)
 
 
 @dataclass(frozen=True)
@@ -129,7 +119,7 @@ class Settings:
         """Which points are stored: those that count, and those of other profiles of this size."""
         top_m = self.profile.height_m + self.margin_m + AROUND_M
         reach_m, high_m = (STORED_STEP_M * float(np.ceil(one / STORED_STEP_M)) for one in (self.reach_m, top_m))
-        low_m = min(self.floor_m, STORED_LOW_M) - BELOW_M
+        low_m = min(self.floor_m, STORED_LOW_M)
         return Space(max(reach_m, STORED_M), low_m, max(high_m, STORED_UP_M), self.left_out)
 
     @cached_property

@@ -27,7 +27,7 @@ from ..standards import LAST_CLASS
 from ..tiles.grid import Key
 from ..tiles.store import SortedFile, append, files_of, fingerprint, kept_points
 from .frame import Course
-from .settings import BELOW_M, Settings, Space
+from .settings import Settings, Space
 
 SECTION_M = 100.0
 """Length of a section: with 1,500 points per square metre on all sides, its points take 0.2 GB."""
@@ -179,20 +179,13 @@ def _sort(
 def _sorted(
     course: Course, station: np.ndarray, space: Space, place: np.ndarray, codes: np.ndarray
 ) -> Iterator[tuple[int, np.ndarray]]:
-    """Yield the points to keep of those near a track, (n, 3), given a station near each, by section."""
-    east, north = (place[:, :2] - course.xyz[station, :2]).T
-    heading, roll = course.heading[station], course.roll[station]
-    aside = north * np.cos(heading) - east * np.sin(heading)
-    rough = (place[:, 2] - course.xyz[station, 2] - np.sin(roll) * aside) * np.cos(roll)
-    slack = BELOW_M + np.abs(course.grade[station]) * 2.0
-    high = np.flatnonzero((rough > space.low_m - slack) & (rough < space.high_m + slack))
-    s, v, w = course.located(place[high], station[high])
-    kept = np.isfinite(s) & (np.abs(v) <= space.reach_m) & (w >= space.low_m) & (w <= space.high_m)
-    s, v, w, codes = s[kept], v[kept], w[kept], codes[high[kept]]
-    section = np.floor(s / SECTION_M).astype(np.int64)
+    """Yield the points to keep of those near a track, (n, 3), given the station nearest to each, by section."""
+    s, v, w = course.located(place, station)
+    kept = np.flatnonzero((np.abs(v) <= space.reach_m) & (w >= space.low_m) & (w <= space.high_m) & np.isfinite(s))
+    section = np.floor(s[kept] / SECTION_M).astype(np.int64)
     for number in np.unique(section).tolist():
-        chosen = section == number
-        points = np.empty(int(chosen.sum()), POINT)
-        points["s"], points["v"], points["w"] = s[chosen] - number * SECTION_M, v[chosen], w[chosen]
-        points["code"] = codes[chosen]
+        mine = kept[section == number]
+        points = np.empty(len(mine), POINT)
+        points["s"], points["v"], points["w"] = s[mine] - number * SECTION_M, v[mine], w[mine]
+        points["code"] = codes[mine]
         yield number, points

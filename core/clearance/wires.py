@@ -24,9 +24,6 @@ BESIDE_M, BESIDE_UP_M = (0.08, 0.40), 0.06
 """Aside and in height: where there are no more points than in a group, because a wire is thin, unlike roofs, beams and
 leaves."""
 
-TRIES = 12
-"""Places at which a group is looked for in a piece; a roof has points at every height."""
-
 HEIGHT_COST, POINT_GAIN, POINTS_GAIN, NONE_COST = 0.3, 0.15, 6, 0.8
 """Cost of a metre of height, gain of each of the first points, their number, and cost of a piece without a wire: the
 lowest thing that goes on is the contact wire, not the messenger, a dropper or an arm."""
@@ -70,7 +67,10 @@ def nodes_of(place: np.ndarray, course: Course) -> np.ndarray:
     """Return the places of the contact wire over a track in points, (n, 3): rows as of `Trace`, (k, 5)."""
     _, v, w = place.T
     points = place[(np.abs(v) < ASIDE_M) & (w > HEIGHT_M[0]) & (w < HEIGHT_M[1])]
-    bins, groups = _groups(*points.T)
+    points = points[np.argsort(points[:, 0], kind="stable")]
+    pieces = np.floor(points[:, 0] / BIN_M)
+    bins = np.arange(pieces[0], pieces[-1] + 1) if len(pieces) else pieces
+    groups = [_from_below(own) for own in np.split(points[:, 1:], np.searchsorted(pieces, bins[1:]))]
     chain = _chain(groups)
     there = np.flatnonzero(chain >= 0)
     if len(there) < LEAST_FITTED:
@@ -78,40 +78,24 @@ def nodes_of(place: np.ndarray, course: Course) -> np.ndarray:
     at = (bins[there] + 0.5) * BIN_M
     way = np.array([groups[i][chain[i]][:2] for i in there])
     points = points[(np.abs(points[:, 1:] - interpolate(way, at, points[:, 0])) <= NEAR_M).all(axis=1)]
-    points = points[np.argsort(points[:, 0], kind="stable")]
     curvature = course.at(at, course.curvature)
     refined = (_refined(points, *one) for one in zip(at.tolist(), curvature.tolist()))
     return np.reshape([row for row in refined if row is not None], (-1, 5))
 
 
-def _groups(s: np.ndarray, v: np.ndarray, w: np.ndarray) -> tuple[np.ndarray, list[np.ndarray]]:
-    """Return the numbers of the pieces, and v, w and number of points of the groups in each, (k, 3)."""
-    if not len(s):
-        return np.empty(0, dtype=np.int64), []
-    number = np.floor(s / BIN_M).astype(np.int64)
-    bins = np.arange(number.min(), number.max() + 1)
-    order = np.lexsort((w, number))
-    borders = np.searchsorted(number[order], np.append(bins, bins[-1] + 1))
-    return bins, [_from_below(v[order[i:j]], w[order[i:j]]) for i, j in zip(borders, borders[1:])]
-
-
-def _from_below(v: np.ndarray, w: np.ndarray) -> np.ndarray:
-    """Return the groups in a piece, (k, 3), given points in the order of their heights."""
+def _from_below(vw: np.ndarray) -> np.ndarray:
+    """Return v, w and number of points of the groups in a piece, (k, 3), the lowest first."""
     found: list[tuple[float, float, int]] = []
-    used = np.zeros(len(w), dtype=bool)
-    for _ in range(TRIES):
-        free = np.flatnonzero(~used)
-        if not len(free) or len(found) == GROUPS:
-            break
-        lowest = free[0]
-        high = w <= w[lowest] + THICK_M
-        mine = ~used & high & (np.abs(v - v[lowest]) <= WIDE_M / 2)
-        middle = float(np.median(v[mine])), float(np.median(w[mine]))
-        aside = np.abs(v - middle[0])
-        beside = (aside > BESIDE_M[0]) & (aside < BESIDE_M[1]) & (np.abs(w - middle[1]) < BESIDE_UP_M)
-        if mine.sum() >= LEAST_POINTS and beside.sum() <= mine.sum():
-            found.append((*middle, int(mine.sum())))
-        used |= mine
+    free = vw[np.argsort(vw[:, 1], kind="stable")]
+    while len(free) and len(found) < GROUPS:
+        aside, up = (free - free[0]).T
+        mine = (up <= THICK_M) & (np.abs(aside) <= WIDE_M / 2)
+        middle = np.median(free[mine], axis=0)
+        aside, up = np.abs(vw - middle).T
+        beside = (aside > BESIDE_M[0]) & (aside < BESIDE_M[1]) & (up < BESIDE_UP_M)
+        if mine.sum() >= max(LEAST_POINTS, beside.sum()):
+            found.append((*middle.tolist(), int(mine.sum())))
+        free = free[~mine]
     return np.reshape(found, (-1, 3))
 
 
@@ -123,10 +107,7 @@ def _chain(groups: Sequence[np.ndarray]) -> np.ndarray:
         gain = HEIGHT_COST * (own[:, 1] - HEIGHT_M[0]) - POINT_GAIN * np.minimum(own[:, 2], POINTS_GAIN)
         change = np.full((len(before) + 1, len(own) + 1), ENTER_COST)
         change[-1, -1] = 0.0
-        turn = (
-            np.abs(before[:, None, 0] - own[None, :, 0]) / TURN_M
-            + np.abs(before[:, None, 1] - own[None, :, 1]) / RISE_M
-        )
+        turn = np.abs(before[:, None, :2] - own[None, :, :2]) @ (1 / TURN_M, 1 / RISE_M)
         change[:-1, :-1] = np.minimum(turn, CHANGE_CAP)
         total = costs[:, None] + change
         back.append(np.argmin(total, axis=0))
@@ -141,24 +122,16 @@ def _chain(groups: Sequence[np.ndarray]) -> np.ndarray:
 
 
 def _refined(points: np.ndarray, s: float, curvature: float) -> tuple[float, ...] | None:
-    """Return s, v, w and the standard errors of the wire at a place; None where too few points tell it.
-
-    The wire is straight where the track bends: in the frame of the track it is a parabola of the known curvature.
-    """
-    fits = []
-    for low, high in WINDOWS_M:
-        i, j = np.searchsorted(points[:, 0], (s + low, s + high))
-        one = _straight(points[i:j, 0] - s, points[i:j, 1:], curvature)
-        fits += [one] if one is not None else []
-    if not fits:
-        return None
-    least = STEADY * min(scatter for *_, scatter in fits)
-    v, w, sigma, _ = next(one for one in fits if one[-1] <= least)
-    return s, v, w, sigma, sigma
+    """Return s, v, w and the standard errors of the wire at a place; None where too few points tell it."""
+    borders = [np.searchsorted(points[:, 0], (s + low, s + high)) for low, high in WINDOWS_M]
+    fits = [_straight(points[i:j, 0] - s, points[i:j, 1:], curvature) for i, j in borders]
+    known = [one for one in fits if one is not None]
+    least = STEADY * min((scatter for *_, scatter in known), default=0.0)
+    return next(((s, v, w, sigma, sigma) for v, w, sigma, scatter in known if scatter <= least), None)
 
 
 def _straight(ahead: np.ndarray, vw: np.ndarray, curvature: float) -> tuple[float, float, float, float] | None:
-    """Fit a straight piece; returns v and w at its origin, their standard error, and the scatter of the points."""
+    """Return v and w at the origin of a straight piece, a parabola in the frame, their standard error, and scatter."""
     values = vw + np.column_stack([0.5 * curvature * ahead**2, np.zeros(len(ahead))])
     kept = np.ones(len(ahead), dtype=bool)
     for _ in range(3):

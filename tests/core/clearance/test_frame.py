@@ -12,12 +12,6 @@ from rail_extract.laboratory.scenes import clearance as scenes
 from rail_extract.laboratory.scenes.clearance import SHORT, courses_of
 
 
-def located(course, way, s, v, w, off_m=0.3):
-    """Return the places of a track in its frame, each found from a station near it."""
-    off = np.random.RandomState(0).uniform(-off_m, off_m, len(s))
-    return course.located(way.place(s, v, w), course.station(s + off))
-
-
 @pytest.fixture(scope="module")
 def track():
     scene = scenes.double_track(1, elements=SHORT, grade=0.020, apart_m=0)
@@ -29,7 +23,9 @@ def test_places_come_back_within_a_fifth_of_a_millimetre(track):
     course, way = track
     rng = np.random.RandomState(3)
     s, v, w = rng.uniform(1, 89, 5000), rng.uniform(-3.2, 3.2, 5000), rng.uniform(0, 7, 5000)
-    for found, true, limit in zip(located(course, way, s, v, w), (s, v, w), (1e-3, 2.1e-4, 2e-4)):
+    for found, true, limit in zip(
+        course.located(way.place(s, v, w), course.station(s)), (s, v, w), (1e-3, 2.1e-4, 2e-4)
+    ):
         assert np.abs(found - true).max() < limit
 
 
