@@ -28,11 +28,9 @@ half a millimetre 4 m aside."""
 CURVATURE_M = 15.0
 """Length over which curvature is the slope of the direction: shorter than the shortest transition curve."""
 
-HALF_SPACING_M = 0.75
-"""Distance of a rail's middle from the centerline where the gauge is not stated: that of standard gauge."""
-
-HEAD_M = 0.07
-"""Width of a head: the middles of rails are further apart than their gauge by it."""
+SPACING_M, HEAD_M = 1.50, 0.07
+"""Distance of the middles of rails where the gauge is not stated, that of standard gauge; and the width of a head, by
+which it exceeds the gauge."""
 
 RAIL_REACH_M = 0.35
 """A rail is looked for within this distance of its expected place: less than half of the narrowest spacing, so that the
@@ -160,7 +158,7 @@ def course_of(line: Centerline, rails: Sequence[RailLine]) -> Course:
     xyz, step_m = own.xyz, own.length_m / (len(own.xyz) - 1)
     direction = _slope(xyz[:, :2], DIRECTION_M, 2, step_m)
     heading = np.unwrap(np.arctan2(direction[:, 1], direction[:, 0]))
-    spacing_m = line.gauge_mm / 1000 + HEAD_M if np.isfinite(line.gauge_mm) else 2 * HALF_SPACING_M
+    spacing_m = line.gauge_mm / 1000 + HEAD_M if np.isfinite(line.gauge_mm) else SPACING_M
     feet, bridged = _feet(xyz, heading, rails, spacing_m)
     between = feet[0] - feet[1]
     has_cant = bool(np.isfinite(between).any())

@@ -19,11 +19,8 @@ from .wires import ARMS_M
 PLATFORM_WORDS, WIRE_WORDS, VEHICLE_WORDS = "platform", "contact wire", "vehicle on track {}"
 """What an object is, where that is known; such objects are named and not counted."""
 
-SAME_SIGMAS = 2.0
-"""Places whose depths differ by fewer standard errors are one surface."""
-
-SURE_SIGMAS = 2.0
-"""An object is inside for sure if its depth exceeds this number of standard errors."""
+SAME_SIGMAS, SURE_SIGMAS = 2.0, 2.0
+"""Places whose depths differ by fewer standard errors are one surface; an object that is deeper is surely inside."""
 
 FIT_FACTOR = 1.6
 """What the standard error of a fit is multiplied by: points of one surface share what the fit does not know, such as
@@ -137,11 +134,7 @@ def _what(course: Course, parts: Sequence[Part], low: np.ndarray, high: np.ndarr
 
 
 def _deepest(surfaces: Sequence[Surface]) -> Surface:
-    """Return the deepest surface of an object.
-
-    The deepest of many places that are equally deep is so by chance. Places are therefore joined from the deepest on,
-    as long as the next one agrees with the mean of those before.
-    """
+    """Return the deepest surface of an object, joined with those that agree with it: it alone is so deep by chance."""
     sure = [one for one in surfaces if one.is_sure] or surfaces
     best, *others = sorted(sure, key=lambda one: -one.depth_m)
     depth_m, weight = best.depth_m, 1.0 / best.sigma_m**2

@@ -87,9 +87,8 @@ class Clearance:
         """Least margin: that of the deepest sure object, else the least of all stations; NaN if nothing is seen."""
         if self.sure:
             return -max(one.pen_mm for one in self.sure) / 1000
-        known = [one.least_m[np.isfinite(one.least_m)] for one in self.stations]
-        known = [one for one in known if len(one)]
-        return max(float(min(one.min() for one in known)), 0.0) if known else np.nan
+        least_m = min((float(one.least_m.min()) for one in self.stations), default=np.inf)
+        return max(least_m, 0.0) if np.isfinite(least_m) else np.nan
 
     @property
     def point_count(self) -> int:

@@ -81,11 +81,7 @@ def near(own: Course, other: Course) -> Course | None:
 
 
 def _beside(own: Course, other: Course) -> np.ndarray:
-    """Return how far another track is to the left, how far above, and how much more cant the outer one of both has.
-
-    (3, n) metres at the stations of the first; NaN where the other one is not near. The cant is 0 where the outer track
-    has less.
-    """
+    """Return how far another track is to the left and above, and how much more cant the outer one has, (3, n)."""
     mine, nearest = other.near(own.xyz[:, :2], REACH_M + STEP_M)
     at, across = Polyline(other.xyz, other.s).feet_near(own.xyz[mine, :2], other.s[nearest])
     same = np.cos(own.heading[mine] - other.heading[nearest])

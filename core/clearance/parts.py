@@ -41,7 +41,7 @@ SEAM_M = 3 * CELL_M
 
 @dataclass(frozen=True)
 class Points:
-    """Points of a section in the order of s, (n, 3): s, v and w; the others are (n,).
+    """Points of a section in the order of s: `place`, (n, 3), has s, v and w; the others are (n,).
 
     Depth is the penetration of the profile with margin and widening, and `kind` what a point is of, see `OTHER`. Points
     that are not the section's own are in its halo. `number` is how many points of the cloud each stands for.
@@ -94,8 +94,6 @@ def parts_of(
     """
     near = points.kept(points.depth > -AROUND_M)
     inside = np.flatnonzero(near.depth > 0)
-    if not len(inside):
-        return []
     inside = _together(near.place, inside, progress)
     found = []
     for kind in np.unique(near.kind[inside]).tolist():

@@ -77,15 +77,12 @@ def _edge(aside: np.ndarray, w: np.ndarray) -> tuple[float, float, float, float]
         return None
     face = (rise < -FACE_M[0]) & (rise > -FACE_M[1]) & (aside < first + FACE_DEPTH_M)
     if face.sum() >= FACE_LEAST:
-        near = aside[face] <= np.percentile(aside[face], 1) + FACE_DEPTH_M
-        kept = np.sort(aside[face][near])
-        cut = int(TRIMMED * len(kept))
-        kept = kept[cut : len(kept) - cut] if cut else kept
+        cut = int(TRIMMED * face.sum())
+        kept = np.sort(aside[face])[cut : face.sum() - cut]
         offset, sigma = float(kept.mean()), float(kept.std() / np.sqrt(len(kept)))
     else:
         offset, sigma = _first_of_level(aside[on_level])
-    residual = rise[on_level]
-    sigmaz = float(residual.std() / np.sqrt(on_level.sum()) * 2)
+    sigmaz = float(2 * rise[on_level].std() / np.sqrt(on_level.sum()))
     return offset, height + slope * offset, max(sigma, 1e-4), max(sigmaz, 1e-4)
 
 
@@ -110,10 +107,7 @@ def _level(aside: np.ndarray, w: np.ndarray) -> tuple[float, float, np.ndarray] 
 
 
 def _first_of_level(aside: np.ndarray) -> tuple[float, float]:
-    """Return where a level face begins that is seen from above only, and the standard error of that.
-
-    Its points are evenly dense: those beyond the noise of the first one show the width of the face there.
-    """
+    """Return where a level face of evenly dense points begins that is seen from above only, and its standard error."""
     inner = float(aside.min()) + EDGE_NOISE_M
     density = max(int(((aside >= inner) & (aside < inner + EVEN_M)).sum()), 1) / EVEN_M
     before = int((aside < inner).sum())
@@ -144,5 +138,4 @@ def on_platforms(edges: np.ndarray, place: np.ndarray) -> np.ndarray:
 def nominal_mm(platform: Trace) -> int | None:
     """Return the nominal height of a platform; None if none is near."""
     mean = 1000 * float(platform.w.mean())
-    best = min(NOMINAL_MM, key=lambda nominal: abs(nominal - mean))
-    return best if abs(best - mean) <= NOMINAL_WITHIN_MM else None
+    return next((one for one in NOMINAL_MM if abs(one - mean) <= NOMINAL_WITHIN_MM), None)

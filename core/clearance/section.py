@@ -24,14 +24,12 @@ BANDS_M = (0.380, 1.170, 3.250, 4.310, 7.000)
 THIRD = 3
 """The third nearest point of a station and band counts: one or two stray points do not."""
 
-MOST_POINTS = 2_000_000
-"""Points of a section above which only the deepest of each cell of a centimetre is kept, with their number."""
+MOST_POINTS, FINE_M = 2_000_000, 0.01
+"""Points of a section above which only the deepest of each cell is kept, with their number, and the side of these
+cells: a surface that is fitted has hundreds of them."""
 
 PIECE_M = 10.0
 """Length of the pieces in which points are put in order, so that a run is cancelled between them."""
-
-FINE_M = 0.01
-"""Side of these cells: a surface that is fitted has hundreds of them."""
 
 Least = tuple[np.ndarray, np.ndarray]
 """Numbers of cells and the `THIRD` least values in each, rising. A cell is a station, side and band: ten times the

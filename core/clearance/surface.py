@@ -20,11 +20,9 @@ DEEPEST = 6
 LEAST_POINTS = 8
 """Fewer points make no surface: four unknowns leave too little to judge them by."""
 
-ENVELOPE_ROUNDS, PLAIN_ROUNDS = 12, 4
-"""Rounds of least squares, the first of which find the upper envelope, the others its middle."""
-
-BELOW_WEIGHT = 0.08
-"""Weight of points below the envelope: those of what stands behind."""
+ENVELOPE_ROUNDS, BELOW_WEIGHT, PLAIN_ROUNDS = 12, 0.08, 4
+"""Rounds of least squares that find the upper envelope, weight of the points below it in these, which are of what
+stands behind, and rounds that find its middle."""
 
 NEAR_SIGMAS, STRAY_SIGMAS = 3.0, 4.0
 """Points within the first number of standard deviations of the noise are of the surface; points further above than the

@@ -141,10 +141,7 @@ def sweep_file(
 def _sort(
     request: Request, header: CloudHeader, courses: Sequence[Course], space: Space, progress: Progress, folder: Path
 ) -> dict:
-    """Write the points of a file to the files of their sections; returns a report.
-
-    "counts" has the number of points by track and section, and "seen" by track and station; for the others see `Swept`.
-    """
+    """Write the points of a file to the files of their sections; returns what `Swept` has, as lists."""
     own_areas = [_touching(_areas(one, space, request), header.extent) for one in courses]
     touched = [at for at, areas in enumerate(own_areas) if len(areas)]
     seen = {at: np.zeros(len(courses[at].xyz), dtype=np.int64) for at in touched}

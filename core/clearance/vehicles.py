@@ -20,14 +20,11 @@ run."""
 BOX_ASIDE_M, BOX_HEIGHT_M = 1.65, (0.3, 4.4)
 """The space of a vehicle on its track."""
 
-INNER_M = 1.0
-"""What is so near to the middle of a track is on it."""
-
 LENGTH_M, TALL_M, SHARE = 6.0, 1.5, 0.6
 """A vehicle is longer and taller than this, and such a share of its points is in its space."""
 
-INNER_SHARE = 0.05
-"""Share of the points of a vehicle on its own track that are near to the middle: its roof and its ends."""
+INNER_M, INNER_SHARE = 1.0, 0.05
+"""What is so near to the middle of a track is on it, and such a share of the points of a vehicle: roof and ends."""
 
 NEAR_M = 3.0
 """How far from a track a point may be to be in the space of its vehicles."""
@@ -73,6 +70,4 @@ def vehicle_on(inside: Counter[int], count: int, track_id: int, length_m: float,
         return None
     if inside[track_id] >= INNER_SHARE * count:
         return track_id
-    others = {number: own for number, own in inside.items() if number != track_id}
-    best = max(others, key=lambda number: others[number], default=None)
-    return best if best is not None and others[best] >= SHARE * count else None
+    return next((number for number, own in inside.most_common() if number != track_id and own >= SHARE * count), None)

@@ -34,33 +34,22 @@ TURN_M, RISE_M, CHANGE_CAP, ENTER_COST = 0.03, 0.02, 12.0, 3.0
 NEAR_M = 0.05, 0.035
 """Points within these distances of the chain, across and in height, are of the wire."""
 
-WINDOWS_M = ((-1.5, 1.5), (-2.2, 0.0), (0.0, 2.2))
-"""Parts around a place over which the wire is straight: the steadiest counts, so that a kink at a support stays."""
+WINDOWS_M, STEADY = ((-1.5, 1.5), (-2.2, 0.0), (0.0, 2.2)), 1.2
+"""Parts around a place over which the wire is straight, and how much more than those of the steadiest part the points
+of the first one that counts may scatter: a kink at a support stays."""
 
-STEADY = 1.2
-"""The first of these parts counts whose points scatter at most this number of times as much as those of the
-steadiest."""
+LEAST_FITTED, ACCEPTED_SIGMAS = 6, 3.0
+"""Points that a straight piece needs, and standard deviations beyond which a point is of an arm or a clamp."""
 
-LEAST_FITTED = 6
-"""Points that a straight piece needs."""
-
-ACCEPTED_SIGMAS = 3.0
-"""A point further off a straight piece, in standard deviations, is of an arm or a clamp."""
-
-JUMP_M = 0.10, 0.06
-"""Change across and in height between pieces at which a wire breaks: ten times that of the steepest one."""
-
-LONGEST_GAP_M, SHORTEST_M = 8.0, 10.0
-"""Longest gap within a wire, and the least length of one."""
+JUMP_M, LONGEST_GAP_M, SHORTEST_M = (0.10, 0.06), 8.0, 10.0
+"""Change across and in height between pieces at which a wire breaks, ten times that of the steepest one; its longest
+gap, and its least length."""
 
 GRADE_M = 20.0
 """Length over which the gradient is measured."""
 
-LIVE_M = 0.15
-"""What is so near to the wire is live itself: clamps and arms. Insulation keeps all else further away."""
-
-ARMS_M = 4.6
-"""Arms are above this height."""
+LIVE_M, ARMS_M = 0.15, 4.6
+"""What is so near to the wire and above this height is live itself: clamps and arms; insulation keeps off the rest."""
 
 
 def nodes_of(place: np.ndarray, course: Course) -> np.ndarray:
