@@ -34,6 +34,10 @@ from ..tracks.parallels import widths_by_gauge
 from ..vectorize import vectorize
 from .seams import SquareRails, join, trim
 
+FAR_SHARE = 0.1
+"""Points per metre of a far rail, at most, by those of the densest rail: they fall with the square of the distance from
+a scanner on the track, so that this rail is three times as far away."""
+
 
 def square_side(parameters: Parameters) -> float:
     """Return the side of the squares in metres; `ParameterError` if they overlap with more than their neighbours."""
@@ -129,18 +133,26 @@ def whole_rails(
 ) -> list[RailLine]:
     """Join the rails of all squares, drop the short ones, cut turns too sharp for a rail, simplify and number them.
 
-    Rails with fewer than `least_points` on their heads are left out. Results that are let go of once they were yielded
-    save a third of the memory of a long railway.
+    Far rails with fewer than `least_points` on their heads are left out. Results that are let go of once they were
+    yielded save a third of the memory of a long railway.
     """
     rails = [rail for rail in join(results, frame) if rail.length_m >= parameters.min_length_m]
-    shown = [rail for rail in rails if rail.points >= least_points]
-    if len(shown) < len(rails):
-        unshown_m = sum(rail.length_m for rail in rails) - sum(rail.length_m for rail in shown)
-        progress.info(
-            f"Left out: {counted(len(rails) - len(shown), 'line')}, {unshown_m:,.0f} m, with fewer than {least_points} "
-            "points on the head, too few to show one."
+    shown = _are_shown(rails, least_points)
+    far_m = [rail.length_m for rail, is_shown in zip(rails, shown) if not is_shown]
+    if far_m:
+        progress.warning(
+            f"{counted(len(far_m), 'line')} ({sum(far_m):,.0f} m) left out: far from the scanner, fewer than "
+            f"{least_points} points do not show a railhead. Classify these rails if you need them."
         )
-    return _numbered(numbered(shown), parameters, first_id, progress)
+    kept = [rail for rail, is_shown in zip(rails, shown) if is_shown]
+    return _numbered(numbered(kept), parameters, first_id, progress)
+
+
+def _are_shown(rails: Sequence[RailLine], least_points: int) -> list[bool]:
+    """Return which rails do not lack points because they are far away; from the air, all are as far."""
+    densities = [rail.points / rail.length_m for rail in rails if rail.points >= least_points]
+    far = FAR_SHARE * max(densities, default=0.0)
+    return [rail.points >= min(least_points, far * rail.length_m) for rail in rails]
 
 
 def lines_of(

@@ -9,6 +9,7 @@ from rail_extract.core.clouds.points import RailPoints
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.frpdf.cleanup import clean
 from rail_extract.core.parameters import Parameters
+from rail_extract.core.progress import SILENT, Recording
 from rail_extract.core.raster import TILE, cell_size, rasterize
 from rail_extract.core.squares.seams import trim
 from rail_extract.core.squares.steps import (
@@ -98,12 +99,14 @@ def test_rasters_of_both_parts_of_a_class_are_one():
     np.testing.assert_allclose(places, np.sort(whole.to_local(whole.cells()) + zero[:2], axis=0), atol=1e-6)
 
 
-def test_lines_with_too_few_points_to_show_a_head_are_left_out():
+@pytest.mark.parametrize(("points", "kept"), [((249, 250, 3000), (250, 3000)), ((249, 250, 900), (249, 250, 900))])
+def test_far_lines_with_too_few_points_to_show_a_head_are_left_out(points, kept):
+    """A tenth of the density of the others is far; from the air, rails of all lengths have the same."""
     parameters = Parameters(STANDARD.gauge_m, STANDARD.head_width_m)
-    rails = [
-        replace(rail, points=points)
-        for rail, points in zip(rails_of(*(np.array([[0.0, y], [30.0, y]]) for y in (0.0, 5.0, 10.0))), (249, 250, 900))
-    ]
-    parts = [trim(rails, Square((0, 0), FRAME, np.inf))]
-    assert [rail.points for rail in whole_rails(parts, FRAME, parameters, least_points=250)] == [250, 900]
-    assert [rail.points for rail in whole_rails(parts, FRAME, parameters)] == [249, 250, 900]
+    lines = (np.array([[0.0, y], [30.0, y]]) for y in (0.0, 5.0, 10.0))
+    rails = [replace(rail, points=count) for rail, count in zip(rails_of(*lines), points)]
+    parts, progress = [trim(rails, Square((0, 0), FRAME, np.inf))], Recording(SILENT)
+    found = whole_rails(parts, FRAME, parameters, progress=progress, least_points=250)
+    assert tuple(rail.points for rail in found) == kept
+    assert len(progress.warnings) == len(points) - len(kept)
+    assert len(whole_rails(parts, FRAME, parameters)) == len(points)
