@@ -77,6 +77,9 @@ FLANK_TOP_SIGMA_M = 0.0012
 REACH_HEADS = 1.0
 """Distance from the line, in head widths, within which the ridge is a parabola: a Gaussian of 7 cm is, to a tenth."""
 
+LEAST_ON_RIDGE = 8
+"""Least points that a parabola is fitted to, whose three unknowns they determine with as many to spare."""
+
 WINDOW = 33
 """Stations that share one crest, 8.25 m: 16 mm of noise moves the crest by 3 mm over this length, and by 6 mm over 2 m.
 The line itself follows curves; only its offsets are averaged."""
@@ -291,9 +294,9 @@ class Ridge:
 
     @classmethod
     def find(cls, points: HeadPoints) -> Ridge | None:
-        """Fit one parabola, and a crest for each window, to the points of a line; None without any, or if not blunt."""
+        """Fit one parabola, and a crest for each window, to points; None with too few, or if they are not blunt."""
         near = points[points.within(REACH_HEADS)]
-        if not points.is_blunt or not len(near.t):
+        if not points.is_blunt or len(near.t) < LEAST_ON_RIDGE:
             return None
         row, rows = near.station, len(near.stations)
         x, up = near.across, near.z - rough_level(near.t, near.z)
@@ -303,7 +306,10 @@ class Ridge:
             flat = up + 0.5 * bend * x**2
             noise_m = robust_sigma(flat[used])
             level, slope, crest, information = _crests(row[used], rows, x[used], flat[used], bend, noise_m)
-            used = np.abs(flat - level[row] - slope[row] * x) <= OFF_TOP_SIGMAS * noise_m
+            off = np.abs(flat - level[row] - slope[row] * x) > OFF_TOP_SIGMAS * noise_m
+            if np.count_nonzero(~off) < LEAST_ON_RIDGE:
+                break
+            used = ~off
         return cls(near.stations, crest, information, np.full(rows, np.hypot(CREST_SIGMA_M, TILT / bend)))
 
 

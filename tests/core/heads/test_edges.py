@@ -47,3 +47,12 @@ def test_a_face_with_much_of_its_corner_is_not_taken_for_a_crown(seed, side):
     flank = find_flank(HeadPoints(t, across, -below + rng.normal(0, noise_m, count), WIDTH, line, free))
     assert flank is not None
     assert abs(flank.left_m + side * WIDTH / 2) < 0.006
+
+
+@pytest.mark.parametrize("count", [0, 1, 2, 3, 5, 12])
+def test_a_few_points_show_a_crest_or_none(count):
+    """Two points of the branch of a world drawn at random stopped the whole run."""
+    for seed in range(20):
+        points = (values[:count] for values in ridge_points(seed=seed))
+        ridge = ridge_of(*points)
+        assert (ridge is not None) == (count == 12)
