@@ -137,7 +137,7 @@ def _guided(heads: Heads, settings: Settings) -> Heads:
 def _pavement(shape: tuple[int, int], points: NearBed) -> np.ndarray:
     """Height above the bed of the pavement at each point, (n,); NaN where the level that it belongs to is not paved.
 
-    A level of its own is a wall or the side of a vehicle, in whose points there are no grooves.
+    Walls and the sides of vehicles have levels of their own, which have no grooves.
     """
     number = points.level * np.int64(shape[0] * shape[1]) + points.coarse
     cells = MAX_LEVELS * shape[0] * shape[1]

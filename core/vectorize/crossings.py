@@ -102,11 +102,11 @@ def _beside_ends(network: LineNetwork) -> Iterator[tuple[int, list[int], list[in
         return
     tips = [tip_and_direction(even_points(network.from_end(end), DIRECTION_M)) for end in free.tolist()]
     places, outward = (np.array(one) for one in zip(*tips))
-    feet = _feet(network, places)
-    for one, other in sorted(cKDTree(places).query_pairs(MAX_MERGED_M)):
-        across = places[other] - places[one]
-        if across @ outward[one] < 0 or across @ outward[other] > 0:
-            continue
+    near = sorted(cKDTree(places).query_pairs(MAX_MERGED_M))
+    across = {(one, other): places[other] - places[one] for one, other in near}
+    facing = [pair for pair, way in across.items() if way @ outward[pair[0]] >= 0 >= way @ outward[pair[1]]]
+    feet = _feet(network, places) if facing else []
+    for one, other in facing:
         for number in sorted((feet[one].keys() & feet[other].keys()) - {int(free[one]) // 2, int(free[other]) // 2}):
             line = network.lines[number]
             first, last = feet[one][number], feet[other][number]
@@ -119,12 +119,13 @@ def _beside_ends(network: LineNetwork) -> Iterator[tuple[int, list[int], list[in
 
 def _feet(network: LineNetwork, places: np.ndarray) -> list[dict[int, int]]:
     """Return for each place, (n, 2), the nearest vertex, within `BESIDE_M`, of each line inside its ends."""
-    vertices = [(number, vertex) for number, line in enumerate(network.lines) for vertex in range(1, len(line) - 1)]
-    xy = np.concatenate([np.empty((0, 2)), *(line[1:-1] for line in network.lines)])
+    inside = [np.arange(1, len(line) - 1) for line in network.lines]
+    number, vertex = np.repeat(np.arange(len(inside)), [len(own) for own in inside]), np.concatenate(inside)
+    xy = np.concatenate([line[own] for line, own in zip(network.lines, inside)])
     found = []
     for place, near in zip(places, cKDTree(xy).query_ball_point(places, BESIDE_M)):
         farthest_first = sorted(near, key=lambda one: -float(np.hypot(*(xy[one] - place))))
-        found.append(dict(vertices[one] for one in farthest_first))
+        found.append({int(number[one]): int(vertex[one]) for one in farthest_first})
     return found
 
 
