@@ -10,6 +10,7 @@ from rail_extract.core.rails import Centerline, RailLine, Support, TrackGeometry
 from rail_extract.core.tiles.grid import MemorySource
 
 ORIGIN = LocalFrame(np.zeros(3))
+IN_FEET = LocalFrame(np.array([387_600.0, 1_430_200.0, 500.0]), 0.3048, 0.3048)
 
 
 def rail_of(line, rail_id=1, **fields):
@@ -87,3 +88,9 @@ def source_of(*parts, code=10, side_m=500.0):
 def rms(values):
     """Root mean square of the values that are known."""
     return float(np.sqrt(np.nanmean(np.square(values))))
+
+
+def slanted_cloud(seed=0, count=4000, length=150.0):
+    """Rail points along a slanted line, in a coordinate system in feet."""
+    along = np.random.RandomState(seed).uniform(0, length, count)
+    return RailPoints(np.column_stack([along, 0.4 * along, np.full(count, 3.0)]), IN_FEET, 10)

@@ -4,9 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from built import rails_of, source_of
-from rail_extract.core.clouds.points import RailPoints
-from rail_extract.core.frame import LocalFrame
+from built import IN_FEET, rails_of, slanted_cloud, source_of
 from rail_extract.core.frpdf.cleanup import clean
 from rail_extract.core.parameters import Parameters
 from rail_extract.core.progress import SILENT, Recording
@@ -28,12 +26,6 @@ from rail_extract.core.tiles.grid import Filling, MemorySource, Square, lay_out,
 STANDARD = STANDARDS["EN_60E1_1435"]
 CELL = 0.04
 SIDE = 4 * TILE * CELL
-FRAME = LocalFrame(np.array([387_600.0, 1_430_200.0, 500.0]), 0.3048, 0.3048)
-
-
-def cloud(seed=0, count=4000, length=150.0):
-    along = np.random.RandomState(seed).uniform(0, length, count)
-    return RailPoints(np.column_stack([along, 0.4 * along, np.full(count, 3.0)]), FRAME, 10)
 
 
 @pytest.mark.parametrize("passes", [1, 2])
@@ -61,20 +53,20 @@ def test_a_gap_at_a_border_is_bridged_as_in_an_undivided_raster(passes):
 
 
 def test_rasters_of_squares_make_the_raster_of_the_whole():
-    points = cloud()
+    points = slanted_cloud()
     source = MemorySource(points, SIDE)
     squares = {square.key: square for square in lay_out([source], source)}
     rasters = {key: own_tiles(rasterize(source.near(square, 1.0).xyz, CELL), square) for key, square in squares.items()}
-    whole = assembled(rasters, squares, FRAME)
+    whole = assembled(rasters, squares, IN_FEET)
     places = np.sort(whole.to_local(whole.cells()), axis=0)
-    zero = Square.on_grid((0, 0), SIDE, FRAME)
-    direct = rasterize(points.xyz - zero.frame.shift_to(FRAME), CELL)
-    expected = np.sort(direct.to_local(direct.cells()) + zero.frame.shift_to(FRAME)[:2], axis=0)
+    zero = Square.on_grid((0, 0), SIDE, IN_FEET)
+    direct = rasterize(points.xyz - zero.frame.shift_to(IN_FEET), CELL)
+    expected = np.sort(direct.to_local(direct.cells()) + zero.frame.shift_to(IN_FEET)[:2], axis=0)
     np.testing.assert_allclose(places, expected, rtol=0, atol=1e-6)
 
 
 def test_a_mosaic_contains_the_tiles_of_the_neighbours():
-    points = cloud()
+    points = slanted_cloud()
     source = MemorySource(points, SIDE)
     squares = {square.key: square for square in lay_out([source], source)}
     rasters = {key: own_tiles(rasterize(source.near(one, 0.0).xyz, CELL), one) for key, one in squares.items()}
@@ -86,14 +78,14 @@ def test_a_mosaic_contains_the_tiles_of_the_neighbours():
 
 
 def test_rasters_of_both_parts_of_a_class_are_one():
-    points = replace(cloud(), strips=np.repeat([1, 2], 2000))
-    zero = Square.on_grid((0, 0), SIDE, FRAME).frame.shift_to(FRAME)
+    points = replace(slanted_cloud(), strips=np.repeat([1, 2], 2000))
+    zero = Square.on_grid((0, 0), SIDE, IN_FEET).frame.shift_to(IN_FEET)
     rasters = []
     for source in parted(MemorySource(points, SIDE), [2]):
         assert isinstance(source, (MemorySource, Filling))
         squares = {square.key: square for square in lay_out([source], source)}
         own = {key: own_tiles(rasterize(source.near(one, 0.0).xyz, CELL), one) for key, one in squares.items()}
-        rasters.append(assembled(own, squares, FRAME))
+        rasters.append(assembled(own, squares, IN_FEET))
     whole = rasterize(points.xyz - zero, CELL)
     places = np.sort(merged(*rasters).to_local(merged(*rasters).cells()), axis=0)
     np.testing.assert_allclose(places, np.sort(whole.to_local(whole.cells()) + zero[:2], axis=0), atol=1e-6)
@@ -105,8 +97,8 @@ def test_far_lines_with_too_few_points_to_show_a_head_are_left_out(points, kept)
     parameters = Parameters(STANDARD.gauge_m, STANDARD.head_width_m)
     lines = (np.array([[0.0, y], [30.0, y]]) for y in (0.0, 5.0, 10.0))
     rails = [replace(rail, points=count) for rail, count in zip(rails_of(*lines), points)]
-    parts, progress = [trim(rails, Square((0, 0), FRAME, np.inf))], Recording(SILENT)
-    found = whole_rails(parts, FRAME, parameters, progress=progress, least_points=250)
+    parts, progress = [trim(rails, Square((0, 0), IN_FEET, np.inf))], Recording(SILENT)
+    found = whole_rails(parts, IN_FEET, parameters, progress=progress, least_points=250)
     assert tuple(rail.points for rail in found) == kept
     assert len(progress.warnings) == len(points) - len(kept)
-    assert len(whole_rails(parts, FRAME, parameters)) == len(points)
+    assert len(whole_rails(parts, IN_FEET, parameters)) == len(points)
