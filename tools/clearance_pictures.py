@@ -13,8 +13,8 @@ matplotlib.use("Agg")
 
 import matplotlib.pyplot as plt
 import numpy as np
+from rail_extract.core.clearance.intrusions import surface_of
 from rail_extract.core.clearance.profiles import named
-from rail_extract.core.clearance.surface import surface_of
 from rail_extract.laboratory.scenes import clearance as scenes
 
 PICTURES = Path(__file__).resolve().parent.parent / "docs" / "pictures"

@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 
 from ..clearance.along import Trace, traced_at
-from ..clearance.measure import Clearance, Stations
+from ..clearance.measure import BANDS_M, Clearance, Stations
 from ..clearance.neighbours import Side
 from ..clearance.platforms import nominal_mm
-from ..clearance.section import BANDS_M
 from ..clearance.wires import grade_pm
 from ..fields import CLEARANCE, INTRUSIONS, PLATFORMS, SIDES, WIRES
 from ..kilometres.axes import PlacedAxes

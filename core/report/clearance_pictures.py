@@ -8,8 +8,7 @@ import numpy as np
 
 from ..clearance.along import Trace
 from ..clearance.intrusions import PLATFORM_WORDS, Intrusion
-from ..clearance.measure import Clearance, Stations
-from ..clearance.section import BANDS_M
+from ..clearance.measure import BANDS_M, Clearance, Stations
 from ..polyline import runs
 from ..progress import written
 from .clearance_slices import Slice

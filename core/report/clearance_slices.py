@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..clearance.intrusions import Intrusion
-from ..clearance.measure import Clearance
-from ..clearance.section import read_points
+from ..clearance.measure import Clearance, read_points
 from ..clearance.sweep import SECTION_M, part_of
 
 PICTURES, SLICE_M, MOST_DRAWN = 20, 0.25, 4000

@@ -265,7 +265,7 @@ def test_points_out_of_reach_are_read_and_not_kept(swept):
 
 def test_a_section_of_many_points_keeps_their_number_and_the_depth(swept, plates, monkeypatch):
     plain = swept(plates)
-    monkeypatch.setattr("rail_extract.core.clearance.section.MOST_POINTS", 1000)
+    monkeypatch.setattr("rail_extract.core.clearance.measure.MOST_POINTS", 1000)
     thinned = swept(plates)
     counts = ([one.points for one in found.intrusions] for found in (thinned, plain))
     assert next(counts) == pytest.approx(next(counts), abs=2)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from rail_extract.core.clearance.surface import surface_of
+from rail_extract.core.clearance.intrusions import surface_of
 
 NOISE_M = 0.005
 
