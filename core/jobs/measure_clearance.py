@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from ..clearance.measure import Clearance
     from ..kilometres.axes import PlacedAxes
     from ..progress import Progress
-    from ..report.clearance_slices import Slice
+    from ..report.clearance_pictures import Slice
     from .result import Result
     from .values import Values
 
@@ -83,8 +83,8 @@ def _run(values: Values, progress: Progress) -> Result:
     from ..clearance.measure import measure
     from ..clearance.settings import Settings
     from ..clearance.sweep import EVERY_CLASS
-    from ..report.clearance_remarks import remarks, step_remarks
-    from ..report.clearance_slices import slices
+    from ..report.clearance import remarks, step_remarks
+    from ..report.clearance_pictures import slices
     from .clearance_inputs import read_courses, read_profile, read_steps
 
     progress = Recording(progress)

@@ -1,17 +1,18 @@
-"""Pictures of the clearance: the diagram along a track, and cross-sections with profile, points and surface."""
+"""Pictures of the clearance: the diagram along a track, and cross-sections with profile, surface and the points there."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..clearance.along import Trace
 from ..clearance.intrusions import PLATFORM_WORDS, Intrusion
-from ..clearance.measure import BANDS_M, Clearance, Stations
+from ..clearance.measure import BANDS_M, Clearance, Stations, read_points
+from ..clearance.sweep import SECTION_M, part_of
 from ..polyline import runs
 from ..progress import written
-from .clearance_slices import Slice
 from .markup import section, tag, text
 from .plots import LEFT, PANEL, RIGHT, SPACE, WIDTH, Curve, Frame, Panel, Shade, bottom_of, broken, picture
 
@@ -35,6 +36,9 @@ SURFACE_M = 0.35
 
 PALETTE = ("#1565c0", "#2e7d4f", "#8e5bb5", "#b26a00", "#00838f", "#6d4c41")
 """Colours of the classes of points."""
+
+PICTURES, SLICE_M, MOST_DRAWN = 20, 0.25, 4000
+"""Number of cross-sections, half the length of their points along the track, and the most points of each."""
 
 
 def diagram(found: Clearance, number: int) -> str:
@@ -190,3 +194,27 @@ def cross_section(found: Clearance, one: Slice) -> str:
 
 def _ring(places: list[tuple[float, float]], style: str) -> str:
     return tag("path", d="M" + "L".join(f"{a:.1f} {b:.1f}" for a, b in places) + "Z", style=style)
+
+
+@dataclass(frozen=True)
+class Slice:
+    """The points around the worst place of an intrusion: v, w, and class, (n,) each; and the widening on both sides."""
+
+    intrusion: Intrusion
+    v: np.ndarray
+    w: np.ndarray
+    code: np.ndarray
+    wide_m: tuple[float, float]
+
+
+def slices(found: Clearance) -> Iterator[Slice]:
+    """Yield the cross-sections of the worst places, while the points along the tracks are on disk."""
+    for one in found.intrusions[:PICTURES]:
+        course, section = found.courses[one.course], int(one.chainage_m // SECTION_M)
+        files = found.swept.files_around(one.course, section)
+        points = read_points(part_of(course, section), section, files, found.settings)
+        near = np.flatnonzero(np.abs(points.place[:, 0] - one.chainage_m) <= SLICE_M)
+        near = near[:: max(len(near) // MOST_DRAWN, 1)]
+        left_m, right_m = course.wide_m[course.station(np.array([one.chainage_m]))][0].tolist()
+        v, w = points.place[near, 1:].T
+        yield Slice(one, v, w, points.code[near], (left_m, right_m))
