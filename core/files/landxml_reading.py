@@ -1,31 +1,30 @@
 """Alignments of a LandXML file: those of this program, and those of other programs.
 
-TODO"""
+Branches of the file are read piece by piece, so that it may be larger than the memory. The parser never resolves
+entities: a file that declares any, such as one that expands to gigabytes, is refused. Each plan element is placed by
+its two ends and shaped by its length and radii. Directions that a file states are not used, because programs disagree
+on their sense."""
 
 from __future__ import annotations
 
+import math
 import re
 import xml.etree.ElementTree as ET  # nosec B405 - files with a DOCTYPE are refused before any entity is read
 from collections.abc import Collection, Iterator, Sequence
-from pathlib import Path
-from typing import Optional
-from xml.parsers import expat
-import numpy as np
-from ..alignment.elements import Alignment, PlanElement
-from ..errors import AlignmentFileError
-from ..frame import ORIGIN_STEP, LocalFrame
-from ..progress import SILENT, Progress
-from .design import within_plan
-import math
-from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any, Optional
+from xml.parsers import expat
+
+import numpy as np
+
 from ..alignment.elements import Alignment, CantElement, Element, Figures, PlanElement, VerticalElement, displaced
 from ..alignment.stations import SAME_PLACE_M, StationRange, Stations
 from ..design_numbers import CANT_MM, GRADE, LENGTH, NUMBER, RADIUS, Kind, check_turn, checked, quoted
-from ..frame import LocalFrame
-from ..progress import Progress
-from .design import BREAK_M
+from ..errors import AlignmentFileError
+from ..frame import ORIGIN_STEP, LocalFrame
+from ..progress import SILENT, Progress
+from .design import BREAK_M, within_plan
 
 METRE = ("meter", "metre")
 
