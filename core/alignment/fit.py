@@ -35,7 +35,7 @@ from .layouts import (
 from .measured import LEAST_POINTS, Deviations, Measured, Track, deviations_of, lateral_signal, measured_of
 from .noise import Noise, strays
 from .plane_fit import FitError, MeasuredLine, PlanFit, fit_plan
-from .signals import CANT, HEIGHT, PLAN, Signal, SignalKind, find_structure, noise_of, refitted
+from .structure import CANT, HEIGHT, PLAN, Signal, SignalKind, find_structure, noise_of, refitted
 
 HOLDS = 3.0
 """A fit does not hold where the line is off by more than this many tolerances, as a root mean square."""

@@ -20,8 +20,7 @@ from .chain import NOTHING, Chain, Held, Span, Unknowns, assembled
 from .elements import Alignment, CantElement, Element, Figures, PlanElement, VerticalElement
 from .noise import Noise, estimated, shared_covariance
 from .plane_fit import FitError, MeasuredLine, PlanFit, fit_plan
-from .signals import FINAL_ROUNDS, FLOOR_M, PLAN, STILL_M, Signal, refitted, started
-from .structure import is_within
+from .structure import FINAL_ROUNDS, FLOOR_M, PLAN, STILL_M, Signal, is_within, refitted, started
 
 SNAP_SIGMAS, SNAP_M = 2.58, 10.0
 """A ramp's end takes the place of a clothoid's end within this many standard errors (1 % level), and metres: the end of

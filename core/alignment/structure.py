@@ -1,18 +1,20 @@
-"""TODO"""
+"""From a signal to its structure: its noise, a first partition into polynomials, and the search for parts and joints.
+
+By an information criterion, changes are tried in turn: parts and joints that go, change or come.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-import numpy as np
-from ..progress import SILENT, Progress
-from .chain import NOTHING, Chain, Held, Span, assembled, fitted, start_of
-from .noise import Noise, estimated, independent_m
 from collections import deque
-from collections.abc import Iterator
-from .chain import Chain, Samples, fitted, residuals
-from .noise import Noise
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..progress import SILENT, Progress
+from .chain import NOTHING, Chain, Held, Samples, Span, assembled, fitted, residuals, start_of
+from .noise import Noise, estimated, independent_m
 
 NOISE_ROUNDS, SETTLED = 8, 1.15
 """Largest number of partitions for the noise, and the growth of the noise below which it is known."""
