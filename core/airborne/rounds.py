@@ -1,20 +1,26 @@
 """From courses to curves: in rounds, the ridges of each line are measured, its sections fitted, and curves drawn.
 
-What lies on and beside a fitted line is looked for over 70 m: two rails on a bed, a better place, or another track.
+What lies on and beside a fitted line is looked for over 70 m: two rails on a bed, a better place, or another track. The
+curves of parallel tracks are drawn together: each bends little, and the distance between two bends less. A section that
+one track hides, or that few points show, lies on the curve of the others, at their distance.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+
 import numpy as np
-from ..polyline import Polyline
+from scipy.sparse import block_diag, csr_matrix, diags, vstack
+
+from ..polyline import Polyline, cross
 from .guide_line import SECTION_M, STATION_M, Corridor, GuidePoints, gather
 from .guide_line import STEP_M as VERTEX_M
 from .ridges import (
     ENOUGH_GAIN,
     HALF_M,
     LEAST_SIGMA_M,
+    OUTLIER,
     RidgeShape,
     Sections,
     binned,
@@ -23,14 +29,7 @@ from .ridges import (
     measure,
     windows,
 )
-from .search import APART_M, LONG, STEP_M, TRACKS_APART_M
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from scipy.sparse import block_diag, csr_matrix, diags, vstack
-from ..polyline import Polyline, cross
-from .guide_line import STATION_M
-from .ridges import OUTLIER, Sections
-from .search import parallel
+from .search import APART_M, LONG, STEP_M, TRACKS_APART_M, parallel
 
 WIDE_M = 5.6
 """Distance from the line up to which places are compared: tracks of one line are rarely farther apart."""

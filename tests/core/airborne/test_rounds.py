@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from rail_extract.core.airborne.curves import differences, draw_together, smooth
 from rail_extract.core.airborne.ridges import RidgeFit, Sections
+from rail_extract.core.airborne.rounds import differences, draw_together, smooth
 from rail_extract.core.polyline import Polyline
 
 LENGTH_M, RADIUS_M, APART_M, NOISE_M = 400.0, 450.0, 4.0, 0.06

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from rail_extract.core.alignment.noise import Noise
-from rail_extract.core.alignment.signals import CANT, PLAN, Signal, find_structure, noise_of
+from rail_extract.core.alignment.structure import CANT, PLAN, Signal, find_structure, noise_of
 
 S = np.arange(0.0, 1200.0)
 
