@@ -8,8 +8,7 @@ from __future__ import annotations
 import argparse
 import sys
 
-from rail_extract.core.checks.findings import examine
-from rail_extract.core.checks.listing import verdict
+from rail_extract.core.checks.findings import examine, verdict
 from rail_extract.core.frpdf.models import NAMES
 from rail_extract.core.parameters import Parameters
 from rail_extract.core.pipeline import extract_rails

@@ -16,7 +16,7 @@ from itertools import combinations, groupby
 from pathlib import Path
 
 import numpy as np
-from rail_extract.core.checks.spacing import measure_spacings
+from rail_extract.core.checks.standard import measure_spacings
 from rail_extract.core.classify.settings import Settings
 from rail_extract.core.clouds.las import laspy
 from rail_extract.core.clouds.on_heads import on_heads

@@ -3,7 +3,8 @@
 Branches of the file are read piece by piece, so that it may be larger than the memory. The parser never resolves
 entities: a file that declares any, such as one that expands to gigabytes, is refused. Each plan element is placed by
 its two ends and shaped by its length and radii. Directions that a file states are not used, because programs disagree
-on their sense."""
+on their sense.
+"""
 
 from __future__ import annotations
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..alignment.elements import Alignment
 from ..alignment.stations import measured
-from ..checks.listing import Finding, list_findings
+from ..checks.findings import Finding, list_findings
 from ..fields import (
     AXES,
     CENTERLINES,

@@ -115,7 +115,7 @@ def _run(values: Values, progress: Progress) -> Result:
 
 def _result(values: Values, network: RailNetwork, origin: Origin) -> Result:
     """Return what was extracted as a result."""
-    from ..checks.listing import summary
+    from ..checks.findings import summary
     from ..files.layers import network_makers
 
     figures: dict[str, Any] = {

@@ -39,7 +39,7 @@ def _stated(values: Values) -> RailStandard | None:
 
 def _run(values: Values, progress: Progress) -> Result:
     """Measure each track."""
-    from ..checks.listing import summary
+    from ..checks.findings import summary
     from ..files.layers import network_makers
     from ..rails import RailNetwork
     from ..report import Origin

@@ -10,8 +10,7 @@ from typing import Protocol
 
 import numpy as np
 
-from ..checks.spacing import warn_of_gauge
-from ..checks.standard import warn_of_raw
+from ..checks.standard import warn_of_gauge, warn_of_raw
 from ..classify.settings import Settings
 from ..clouds.header import CloudHeader
 from ..clouds.points import AIRBORNE, Request, read_each

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..airborne.guide_line import STATION_M
 from ..airborne.survey import FLIGHT, AirborneSurvey, AirborneTrack
-from ..checks.listing import OFF_RAIL_MM, Finding
+from ..checks.findings import OFF_RAIL_MM, Finding
 from ..progress import counted, metres, written
 from .markup import legend, made, page, section, table, verdict_box
 from .page import stated

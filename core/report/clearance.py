@@ -1,4 +1,4 @@
-"""The page about the clearance along tracks: verdict, diagrams, the worst cross-sections and tables; and what a run says."""
+"""The page about the clearance along tracks, with diagrams and the worst cross-sections, and what a run says of it."""
 
 from __future__ import annotations
 

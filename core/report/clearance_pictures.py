@@ -1,4 +1,4 @@
-"""Pictures of the clearance: the diagram along a track, and cross-sections with profile, surface and the points there."""
+"""Pictures of the clearance: the diagram along a track, and cross-sections with profile, surface and the points."""
 
 from __future__ import annotations
 

@@ -13,8 +13,20 @@ from pathlib import Path
 import numpy as np
 
 from .. import VERSION
-from ..checks.findings import DOUBTS, GAUGE_OFF_MM, UNSUPPORTED, Doubt, Findings, TrackFindings, examine, known, median
-from ..checks.listing import Finding, listed, verdict
+from ..checks.findings import (
+    DOUBTS,
+    GAUGE_OFF_MM,
+    UNSUPPORTED,
+    Doubt,
+    Finding,
+    Findings,
+    TrackFindings,
+    examine,
+    known,
+    listed,
+    median,
+    verdict,
+)
 from ..clouds.crs import parse_crs
 from ..frame import LocalFrame
 from ..parameters import Parameters

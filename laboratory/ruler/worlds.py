@@ -16,8 +16,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ...core.checks.findings import examine
-from ...core.checks.listing import Finding, list_findings, verdict
+from ...core.checks.findings import Finding, examine, list_findings, verdict
 from ...core.clouds.points import ask
 from ...core.comparison.measures import cut
 from ...core.errors import RailExtractError

@@ -19,7 +19,7 @@ pytest.importorskip("distributed")
 
 from rail_extract.__main__ import INTERRUPTED, main  # noqa: E402
 from rail_extract.core import pipeline  # noqa: E402
-from rail_extract.core.checks.listing import list_findings  # noqa: E402
+from rail_extract.core.checks.findings import list_findings  # noqa: E402
 from rail_extract.core.clouds.points import read_rail_points  # noqa: E402
 from rail_extract.core.commands.extract import INCOMPLETE  # noqa: E402
 from rail_extract.core.fields import FINDING_FIELDS, QUALITY_FIELDS, RAIL_FIELDS  # noqa: E402

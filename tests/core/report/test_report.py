@@ -9,8 +9,17 @@ import pytest
 from built import centerline_of, geometry_of, rail_of
 from hypothesis import given
 from hypothesis import strategies as st
-from rail_extract.core.checks.findings import OFF_GAUGE, UNSUPPORTED, UNSURE, examine
-from rail_extract.core.checks.listing import HOLE, LONE_RAIL, OFF_RAIL_MM, list_findings, summary
+from rail_extract.core.checks.findings import (
+    HOLE,
+    LONE_RAIL,
+    OFF_GAUGE,
+    OFF_RAIL_MM,
+    UNSUPPORTED,
+    UNSURE,
+    examine,
+    list_findings,
+    summary,
+)
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.progress import metres
 from rail_extract.core.rails import (
