@@ -10,7 +10,7 @@ import numpy as np
 
 mpl.use("Agg")
 from matplotlib import pyplot as plt
-from rail_extract.core.comparison.measures import cut
+from rail_extract.core.comparison import cut
 from rail_extract.core.disk import Destination
 from rail_extract.laboratory.ruler.worlds import NEAR_M, Fault, Judged
 from rail_extract.laboratory.scenes.raw_world import (

@@ -16,9 +16,8 @@ import numpy as np
 from ..errors import ParameterError, RailExtractError
 from ..polyline import Polyline, distance_to, runs
 from ..progress import Progress, counted
-from .elements import Alignment
+from .elements import SAME_PLACE_M, Alignment
 from .noise import strays
-from .stations import SAME_PLACE_M
 
 LEAST_TRACK_M, LEAST_POINTS = 50.0, 20
 """Least length of a track, metres, and least number of its points: the shortest curve that has a radius."""

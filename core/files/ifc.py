@@ -20,8 +20,17 @@ from typing import Any
 
 import numpy as np
 
-from ..alignment.elements import UNIT_NODES, UNIT_WEIGHTS, Alignment, CantElement, PlanElement, VerticalElement
-from ..alignment.stations import StationRange, Stations, stations_of
+from ..alignment.elements import (
+    UNIT_NODES,
+    UNIT_WEIGHTS,
+    Alignment,
+    CantElement,
+    PlanElement,
+    StationRange,
+    Stations,
+    VerticalElement,
+    stations_of,
+)
 from ..progress import SILENT, Progress
 from .design import PROGRAM, SAME_BEND, Delivery, names
 

@@ -16,8 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..alignment.elements import Alignment, PlanElement, VerticalElement
-from ..alignment.stations import Stations, stations_of
+from ..alignment.elements import Alignment, PlanElement, Stations, VerticalElement, stations_of
 from ..progress import SILENT, Progress
 from .design import PROGRAM, SAME_BEND, Delivery, names
 

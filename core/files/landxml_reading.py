@@ -19,8 +19,18 @@ from xml.parsers import expat
 
 import numpy as np
 
-from ..alignment.elements import Alignment, CantElement, Element, Figures, PlanElement, VerticalElement, displaced
-from ..alignment.stations import SAME_PLACE_M, StationRange, Stations
+from ..alignment.elements import (
+    SAME_PLACE_M,
+    Alignment,
+    CantElement,
+    Element,
+    Figures,
+    PlanElement,
+    StationRange,
+    Stations,
+    VerticalElement,
+    displaced,
+)
 from ..design_numbers import CANT_MM, GRADE, LENGTH, NUMBER, RADIUS, Kind, check_turn, checked, quoted
 from ..errors import AlignmentFileError
 from ..frame import ORIGIN_STEP, LocalFrame

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Union
 
 import numpy as np
 
-from ..alignment.elements import Alignment
-from ..alignment.stations import measured
+from ..alignment.elements import Alignment, measured
 from ..checks.findings import Finding, list_findings
 from ..fields import (
     AXES,
@@ -36,7 +35,7 @@ from .table import rows
 
 if TYPE_CHECKING:
     from ..airborne.survey import AirborneLine, AirborneTrack
-    from ..comparison.tracks import TrackComparison
+    from ..comparison import TrackComparison
     from ..grow.growth import Stop
 
     Line = Union[RailLine, Centerline, Finding, AirborneLine]

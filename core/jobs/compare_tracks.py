@@ -28,7 +28,7 @@ from .result import Result
 from .values import Job, Values
 
 if TYPE_CHECKING:
-    from ..comparison.tracks import Survey, TrackComparison
+    from ..comparison import Survey, TrackComparison
     from ..frame import LocalFrame
 
 SURVEYS = {"REFERENCE": ("REFERENCE_RAILS", "REFERENCE_SIGMA"), "INPUT": ("RAILS", "INPUT_SIGMA")}
@@ -64,7 +64,7 @@ def _check(values: Values) -> None:
 
 def _run(values: Values, progress: Progress) -> Result:
     """Read both surveys and compare them."""
-    from ..comparison.tracks import compare_surveys, doubts_of
+    from ..comparison import compare_surveys, doubts_of
     from ..files.layers import differences_layer
     from ..report.comparison import build_comparison, describe_shift, verdict_on
 
@@ -91,7 +91,7 @@ def _run(values: Values, progress: Progress) -> Result:
 
 def _survey(values: Values, name: str, frame: LocalFrame | None, progress: Progress) -> tuple[Survey, LocalFrame]:
     """Read one survey in a frame; without one, in its own, which is returned as well."""
-    from ..comparison.tracks import Survey
+    from ..comparison import Survey
     from .lines import way
 
     rails, sigma = SURVEYS[name]
@@ -112,7 +112,7 @@ def _figures(found: TrackComparison) -> dict[str, Any]:
     """Return lengths in metres, and root mean squares and the shift in millimetres; None if unknown."""
     import numpy as np
 
-    from ..comparison.tracks import BOTH, EXTRA, MISSING
+    from ..comparison import BOTH, EXTRA, MISSING
 
     across, height = (found.values(name) for name in ("across_mm", "height_mm"))
     east, north = 1000 * found.shift.plan_m if len(across) else (np.nan, np.nan)

@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from ..clouds.crs import MAX_COORDINATE, is_geographic, name_of, parse_crs, units, warn_of_scale
-from ..comparison.tracks import SurveyedLine
+from ..comparison import SurveyedLine
 from ..design_places import has_stray
 from ..errors import CrsError, MissingError, RailExtractError
 from ..fields import CENTERLINE_FIELDS, RAIL_FIELDS, Field

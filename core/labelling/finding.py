@@ -22,8 +22,7 @@ from ..clouds.points import Request, read_each
 from ..clouds.readers import CloudHeader, read_points, shows_scanner
 from ..errors import CloudError, NoRailPointsError, ParameterError
 from ..frame import LocalFrame
-from ..learned.model import Classifier
-from ..learned.square import label_square
+from ..learned.model import Classifier, label_square
 from ..progress import SILENT, Progress, counted
 from ..rails import ENOUGH_CELLS_PER_M, SearchFigures
 from ..run.loop import Runner

@@ -12,9 +12,16 @@ from typing import Any
 
 import numpy as np
 
-from ..alignment.elements import Alignment, CantElement, Element, PlanElement, VerticalElement
+from ..alignment.elements import (
+    Alignment,
+    CantElement,
+    Element,
+    PlanElement,
+    StationRange,
+    VerticalElement,
+    stations_of,
+)
 from ..alignment.measured import Deviations
-from ..alignment.stations import StationRange, stations_of
 from ..checks.findings import largest, rms
 from ..progress import metres
 from ..tracks.geometry import GRADE_BASE_M, HALF_CHORD_M

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...core.comparison.measures import cut
+from ...core.comparison import cut
 from ...core.polyline import Chords
 from ...core.rails import RailLine
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...core.classify.settings import Settings
 from ...core.clouds.points import RailPoints
-from ...core.comparison.measures import cut
+from ...core.comparison import cut
 from ...core.parameters import Parameters
 from ...core.pipeline import extract_rails
 from ...core.rails import RailNetwork, SearchFigures

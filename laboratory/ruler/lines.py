@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ...core.comparison.measures import cut
+from ...core.comparison import cut
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...core.comparison.measures import ASTRAY_M, cut, spacing_and_cant
+from ...core.comparison import ASTRAY_M, cut, spacing_and_cant
 from ...core.polyline import Polyline, project
 from ...core.rails import Centerline, RailLine, TrackGeometry
 

@@ -18,7 +18,7 @@ from scipy.spatial import cKDTree
 
 from ...core.checks.findings import Finding, examine, list_findings, verdict
 from ...core.clouds.points import ask
-from ...core.comparison.measures import cut
+from ...core.comparison import cut
 from ...core.errors import RailExtractError
 from ...core.parameters import Parameters
 from ...core.pipeline import extract_files

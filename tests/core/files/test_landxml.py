@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from rail_extract.core.alignment.elements import Alignment, CantElement, VerticalElement, chained
-from rail_extract.core.alignment.stations import stations_of
+from rail_extract.core.alignment.elements import Alignment, CantElement, VerticalElement, chained, stations_of
 from rail_extract.core.files.design import Delivery
 from rail_extract.core.files.landxml import NAMESPACE, write_landxml
 from rail_extract.core.files.landxml_reading import read_landxml, stated_system

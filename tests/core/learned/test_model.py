@@ -1,4 +1,4 @@
-"""Weights on disk, what is refused, and the probabilities of a square."""
+"""Weights on disk, what is refused, the probabilities of a square, and the shipped weights."""
 
 import sys
 
@@ -8,6 +8,8 @@ from rail_extract.core.errors import ModelError
 from rail_extract.core.learned import model
 from rail_extract.core.learned.blocks import cut, thin
 from rail_extract.core.progress import Progress, Recording
+from rail_extract.laboratory.ruler.classification import score
+from rail_extract.laboratory.scenes.raw_catalogue import AIR
 from rail_extract.laboratory.scenes.raw_shapes import flat, rough, with_track
 
 
@@ -73,3 +75,10 @@ def test_a_full_graphics_card_is_left_for_the_cpu_or_named(network, monkeypatch)
     network.forward = full
     with pytest.raises(ModelError, match="too little free memory: set DEVICE to CPU"):
         classifier.probabilities(thinned, blocks)
+
+
+def test_the_shipped_weights_find_the_rails_in_a_cloud_from_the_air():
+    pytest.importorskip("torch")
+    learned, _ = score(AIR["air 150"](5), True, model.SHIPPED)
+    assert learned.recall > 0.97
+    assert learned.precision > 0.96

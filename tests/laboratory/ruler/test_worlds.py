@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from built import geometry_of
-from rail_extract.core.comparison.measures import cut
+from rail_extract.core.comparison import cut
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.polyline import length_along
 from rail_extract.core.rails import Centerline, RailLine, RailNetwork, Support

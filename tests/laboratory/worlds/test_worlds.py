@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rail_extract.core.comparison.measures import cut
+from rail_extract.core.comparison import cut
 from rail_extract.laboratory.scenes.raw_world import HEAD
 from rail_extract.laboratory.worlds.classes import HEADS, classified, draw_classification
 from rail_extract.laboratory.worlds.railway import draw_railway

@@ -1,4 +1,4 @@
-"""Lines of two surveys compared in QGIS, with the rails of both; `tests/core/comparison` has the measures."""
+"""Lines of two surveys compared in QGIS, with the rails of both; `tests/core/test_comparison.py` has the measures."""
 
 import numpy as np
 import pytest

@@ -5,8 +5,7 @@ import pytest
 from heard import Heard
 from hypothesis import given
 from hypothesis import strategies as st
-from rail_extract.core.comparison.measures import cut, find_shift, spacing_and_cant
-from rail_extract.core.comparison.tracks import Survey, SurveyedLine, compare_surveys
+from rail_extract.core.comparison import Survey, SurveyedLine, compare_surveys, cut, find_shift, spacing_and_cant
 from rail_extract.core.errors import Cancelled
 from rail_extract.core.parameters import ComparisonParameters
 from rail_extract.core.rails import RailLine
