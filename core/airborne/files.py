@@ -14,8 +14,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..clouds.points import Request, strips_of
-from ..clouds.readers import Extent, read_classes
+from ..clouds.points import Request, read_each, strips_of, touching
+from ..clouds.readers import CloudHeader, read_classes
 from ..errors import NoRailPointsError, ParameterError
 from ..frame import LocalFrame
 from ..parameters import AirborneParameters
@@ -23,7 +23,7 @@ from ..polyline import Polyline
 from ..progress import SILENT, Progress
 from ..raster import ROW
 from ..run.loop import Runner
-from ..run.tasks import READ_S, Context, Task
+from ..run.tasks import Context, Task
 from ..standards import STANDARDS
 from ..tiles.grid import Key
 from ..tiles.store import SortedFile, append, counts_of, files_of, read_stored
@@ -54,9 +54,6 @@ MARGIN_M = 120.0
 
 CELL_M = 16.0
 """Side of the cells that make up the surroundings of guides."""
-
-AREA_M = 200.0
-"""Length of guide in a rectangle in which points are read."""
 
 POINT = np.dtype([("xyz", "<f8", 3), ("mark", "<u4")])
 """A point on disk: metres from the zero of the coordinate system, and its mark, see `passes.marks_of`."""
@@ -145,46 +142,37 @@ def numbers_of(cells: np.ndarray) -> np.ndarray:
     return cells[:, 0] * ROW + cells[:, 1]
 
 
-def areas_along(pieces: Sequence[GuidePart], reach_m: float) -> np.ndarray:
-    """Return rectangles that hold all places within reach of the pieces, (k, 4) metres."""
-    parts = [
-        part for piece in pieces for part in np.array_split(piece.axis.xy, max(int(len(piece.axis.xy) / AREA_M), 1))
-    ]
-    low, high = (np.array([reduce(part, axis=0) for part in parts]) for reduce in (np.min, np.max))
-    return np.column_stack([low - reach_m, high + reach_m])
-
-
 def spool(run: Run, squares: Mapping[Key, tuple[GuidePart, ...]]) -> list[SortedFile]:
     """Sort the points around the guides into squares on disk."""
-    request, folder = run.request, run.folder
-    wide_m = run.parameters.reach_m + WIDE_M + HALF_M
-    areas = {key: areas_along(pieces, wide_m) / request.zero.horizontal_unit_m for key, pieces in squares.items()}
+    request, wide_m = run.request, run.parameters.reach_m + WIDE_M + HALF_M
+    areas = {
+        key: np.concatenate([request.areas_along(piece.axis.xy, wide_m) for piece in pieces])
+        for key, pieces in squares.items()
+    }
     around = {key: cells_around([piece.axis for piece in pieces], wide_m) for key, pieces in squares.items()}
-    tasks = {}
-    for number, header in enumerate(request.headers):
-        touched = {key: some for key, all_areas in areas.items() if len(some := _touched(all_areas, header.extent))}
+    headers, arguments = [], []
+    for header in request.headers:
+        touched = {key: some for key, own in areas.items() if len(some := touching(own, header.extent))}
         if touched:
-            arguments = (request, number, np.concatenate([*touched.values()]), {key: around[key] for key in touched})
-            weight = READ_S * (header.point_count + 1)
-            tasks[number] = Task(header.path.name, spool_file, (*arguments, folder), weight=weight)
-    return [one for _, one in run.runner.run(tasks, run.progress)]
-
-
-def _touched(areas: np.ndarray, extent: Extent) -> np.ndarray:
-    """Return the rectangles, (k, 4), that touch an extent; one of NaN may be anywhere."""
-    low, high = np.array(extent[:2]), np.array(extent[2:])
-    return areas[~((areas[:, :2] > high) | (areas[:, 2:] < low)).any(axis=1)]
+            headers.append(header)
+            arguments.append((np.concatenate([*touched.values()]), {key: around[key] for key in touched}, run.folder))
+    return read_each(replace(request, headers=tuple(headers)), spool_file, arguments, run.runner, run.progress)
 
 
 def spool_file(
-    request: Request, number: int, areas: np.ndarray, around: Mapping[Key, np.ndarray], folder: Path, context: Context
+    request: Request,
+    header: CloudHeader,
+    areas: np.ndarray,
+    around: Mapping[Key, np.ndarray],
+    folder: Path,
+    context: Context,
 ) -> SortedFile:
     """Sort the points of a file into squares; a task.
 
     Given are rectangles in which points are needed, (k, 4) in units of the CRS, and the cells whose points each square
     needs.
     """
-    header, mine = request.headers[number], SortedFile.new_folder(folder)
+    mine = SortedFile.new_folder(folder)
     counts: Counter[Key] = Counter()
     anywhere = np.unique(np.concatenate([*around.values()]))
     chunks = read_classes(header.path, request.class_codes, context.progress, areas, request.leave_out)

@@ -18,7 +18,7 @@ import numpy as np
 
 from .. import disk
 from ..clouds.header import CloudHeader
-from ..clouds.points import Request, read_each
+from ..clouds.points import Request, read_each, touching
 from ..clouds.readers import read_classes
 from ..progress import SILENT, Progress, counted
 from ..run.loop import Runner
@@ -40,9 +40,6 @@ POINT = np.dtype([("s", "<f4"), ("v", "<f4"), ("w", "<f4"), ("code", "u1")])
 """A point on disk: chainage from the start of its section, v and w in metres, and class."""
 
 EVERY_CLASS = tuple(range(LAST_CLASS + 1))
-
-AREA_M = 200.0
-"""Length of track in a rectangle in which points are read."""
 
 STRIDE = 100
 """One of this number of points near a track shows the height of the cloud."""
@@ -88,10 +85,10 @@ def sweep(
         folder.mkdir(parents=True, exist_ok=True)
     disk.sweep(folder)
     space = settings.space
-    areas = np.concatenate([_areas(one, space, request) for one in courses])
-    near = tuple(header for header in request.headers if len(_touching(areas, header.extent)))
+    areas = np.concatenate([request.areas_along(one.xyz[:, :2], _far_m(one, space)) for one in courses])
+    near = tuple(header for header in request.headers if len(touching(areas, header.extent)))
     arguments = [(courses, space, folder)] * len(near)
-    found = read_each(replace(request, headers=near), sweep_file, arguments, runner, progress) if near else []
+    found = read_each(replace(request, headers=near), sweep_file, arguments, runner, progress)
     kept = sum(is_kept for _, _, is_kept in found)
     if kept:
         verb, whose = ("is", "its") if kept == 1 else ("are", "their")
@@ -112,20 +109,6 @@ def _far_m(course: Course, space: Space) -> float:
     return space.reach_m + space.high_m * float(np.abs(np.sin(course.roll)).max())
 
 
-def _areas(course: Course, space: Space, request: Request) -> np.ndarray:
-    """Return rectangles, (k, 4) in units of the CRS, that hold all points to store of a track."""
-    parts = np.array_split(course.xyz[:, :2], max(int(course.length_m / AREA_M), 1))
-    low, high = (np.array([reduce(part, axis=0) for part in parts]) for reduce in (np.min, np.max))
-    far_m = _far_m(course, space)
-    return np.column_stack([low - far_m, high + far_m]) / request.zero.horizontal_unit_m
-
-
-def _touching(areas: np.ndarray, extent: Sequence[float]) -> np.ndarray:
-    """Return the rectangles, (k, 4), that touch an extent; one of NaN may be anywhere."""
-    low, high = np.array(extent[:2]), np.array(extent[2:])
-    return areas[~((areas[:, :2] > high) | (areas[:, 2:] < low)).any(axis=1)]
-
-
 def sweep_file(
     request: Request, header: CloudHeader, courses: Sequence[Course], space: Space, folder: Path, context: Context
 ) -> tuple[SortedFile, dict, bool]:
@@ -142,7 +125,8 @@ def _sort(
     request: Request, header: CloudHeader, courses: Sequence[Course], space: Space, progress: Progress, folder: Path
 ) -> dict:
     """Write the points of a file to the files of their sections; returns what `Swept` has, as lists."""
-    own_areas = [_touching(_areas(one, space, request), header.extent) for one in courses]
+    areas = [request.areas_along(one.xyz[:, :2], _far_m(one, space)) for one in courses]
+    own_areas = [touching(one, header.extent) for one in areas]
     touched = [at for at, areas in enumerate(own_areas) if len(areas)]
     seen = {at: np.zeros(len(courses[at].xyz), dtype=np.int64) for at in touched}
     counts, heights = Counter[Key](), Counter[int]()

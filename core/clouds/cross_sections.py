@@ -10,8 +10,7 @@ from scipy.spatial import cKDTree
 
 from ..polyline import Polyline
 from ..progress import SILENT, Progress
-from .points import Request
-from .readers import CloudHeader
+from .points import Request, touching
 
 
 @dataclass(frozen=True)
@@ -58,9 +57,9 @@ def points_near(
     """
     found: list[list[np.ndarray]] = [[np.empty((0, 3))] for _ in places]
     plan = np.array([place[:2] for place in places]).reshape(-1, 2)
-    tree = cKDTree(plan)
+    tree, areas = cKDTree(plan), np.column_stack([plan - reach_m, plan + reach_m]) / request.zero.horizontal_unit_m
     for header, share in zip(request.headers, request.shares(progress)):
-        if not _reaches(header, request, plan, reach_m):
+        if not len(touching(areas, header.extent)):
             continue
         for xyz, *_ in request.read(header, share):
             local = request.zero.to_local(xyz)
@@ -70,11 +69,3 @@ def points_near(
                 if len(near):
                     found[number].append(near)
     return [np.concatenate(parts) for parts in found]
-
-
-def _reaches(header: CloudHeader, request: Request, plan: np.ndarray, reach_m: float) -> bool:
-    """Return whether a place is within reach of a file's extent; an extent of NaN may be anywhere."""
-    west, south, east, north = np.array(header.extent) * request.zero.horizontal_unit_m
-    x, y = plan.T
-    away = (x < west - reach_m) | (x > east + reach_m) | (y < south - reach_m) | (y > north + reach_m)
-    return not away.all()

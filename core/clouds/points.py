@@ -31,6 +31,8 @@ PLACE_M = 40.0
 MAX_PASSED = 5_000_000
 """Number of points of any class after which a sample ends."""
 
+STRETCH_M = 200.0
+"""Length of line in a rectangle in which points along it are read."""
 
 AIRBORNE = "Track Centerlines from Airborne Lidar"
 AIRBORNE_SIDE_M, AIRBORNE_DENSITY = 20.0, (0.5, 60.0)
@@ -149,7 +151,7 @@ class Request:
 
     def read(self, header: CloudHeader, progress: Progress = SILENT) -> Iterator[Chunk]:
         """Read the points requested from a file chunk by chunk; see `readers.read_classes`."""
-        if not all(_overlap(header.extent, area) for area in self._areas()):
+        if len(touching(np.reshape(self._areas(), (-1, 4)), header.extent)) < len(self._areas()):
             return
         chunks = read_classes(header.path, self.class_codes, progress, self._bounds(), self.leave_out)
         for xyz, codes, marks, census in chunks:
@@ -163,6 +165,13 @@ class Request:
         if self.mask is not None:
             inside[inside] = self.mask.holds(xyz[inside])
         return inside
+
+    def areas_along(self, xy: np.ndarray, reach_m: float) -> np.ndarray:
+        """Return rectangles that hold all places within reach of a line, (k, 4), given its vertices, (n, 2) metres."""
+        length_m = float(np.hypot(*np.diff(xy, axis=0).T).sum())
+        parts = np.array_split(xy, min(max(int(length_m / STRETCH_M), 1), len(xy)))
+        low, high = (np.array([reduce(part, axis=0) for part in parts]) for reduce in (np.min, np.max))
+        return np.column_stack([low - reach_m, high + reach_m]) / self.zero.horizontal_unit_m
 
     @property
     def where(self) -> str:
@@ -254,7 +263,7 @@ def read_each(
     """Run a task on each file of a request, given the arguments for each, and return the results in order.
 
     The function also gets the request without its files, and the header of the file; see `Task`. Raises CloudError if
-    not one file could be read.
+    there are files and not one could be read.
     """
     alone = replace(request, headers=())
     tasks = {
@@ -264,7 +273,7 @@ def read_each(
         for number, (header, own) in enumerate(zip(request.headers, arguments))
     }
     found = [result for _, result in runner.run(tasks, progress)]
-    if not found:
+    if tasks and not found:
         raise CloudError(f"Not one file could be read; the last error was: {runner.failures[-1]}")
     return found
 
@@ -368,9 +377,10 @@ def _collect(request: Request, progress: Progress) -> tuple[np.ndarray, np.ndarr
     return xyz, codes, marks
 
 
-def _overlap(a: Extent, b: Extent) -> bool:
-    """Return whether two extents overlap; an extent of NaN, as a header may state it, may be anywhere."""
-    return not (a[0] > b[2] or b[0] > a[2] or a[1] > b[3] or b[1] > a[3])
+def touching(areas: np.ndarray, extent: Extent) -> np.ndarray:
+    """Return the rectangles, (k, 4), that touch an extent; one of NaN, as a header may state it, may be anywhere."""
+    low, high = np.array(extent[:2]), np.array(extent[2:])
+    return areas[~((areas[:, :2] > high) | (areas[:, 2:] < low)).any(axis=1)]
 
 
 def _inside(xyz: np.ndarray, extent: Extent) -> np.ndarray:
