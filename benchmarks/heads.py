@@ -120,7 +120,7 @@ def errors_of(rails: Sequence[RailLine], true: Sequence[np.ndarray]) -> list[flo
     for number, rail in enumerate(rails):
         mine = found.line == number
         if rail.support is not None:
-            for row, stated in zip(sigmas, (rail.support.sigma_m, rail.support.heights_m)):
+            for row, stated in zip(sigmas, (rail.support.sigma_m, rail.support.sigmaz_m)):
                 row[mine] = np.interp(found.t[mine], rail.support.t, stated)
     compared, near = found.within(TOLERANCE_M), found.back.distance <= TOLERANCE_M
     offs = np.abs([found.back.lateral[near], found.back.height[near]])

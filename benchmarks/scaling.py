@@ -259,7 +259,7 @@ def laid_rails(source: SpooledPoints, square: Square, *_) -> SquareRails:
         return trim([], square)
     stations = np.arange(0.0, np.ptp(vertices), STATION_M)
     figures = np.full(len(stations), 0.001)
-    support = Support(stations, np.full(len(stations), 30), figures, sigmaz_m=figures.copy())
+    support = Support.of_one_strip(stations, np.full(len(stations), 30), figures, 0.001)
     half_m = 0.5 * spacing(STANDARD)
     sides = [track_m + side_m for track_m in TRACKS_AT_M for side_m in (-half_m, half_m)]
     plans = [vertices[:, None] * ahead + side_m * left - corner for side_m in sides]

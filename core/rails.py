@@ -29,20 +29,26 @@ class Support:
         Points on top of the railhead for which this is the nearest station.
     sigma_m : float
         Standard error of the line's lateral position.
-    strips : (n, 3) array or None
+    sigmaz_m : float
+        Standard error of the line's height; NaN if it has none.
+    strips : (n, 3) array
         Number of strips, passes of the scanner, that show the line, the largest distance between two of them, across
         or in height, metres, and the part of the standard error that they share with the other rail. The distance is
-        NaN where there is one strip, unless its head is blurred as if there were two. None if all points are of one
-        strip and no head is blurred.
-    sigmaz_m : (n,) array or None
-        Standard error of the line's height; None if it has none.
+        NaN where there is one strip, unless its head is blurred as if there were two.
     """
 
     t: np.ndarray
     points: np.ndarray
     sigma_m: np.ndarray
-    strips: np.ndarray | None = None
-    sigmaz_m: np.ndarray | None = None
+    sigmaz_m: np.ndarray
+    strips: np.ndarray
+
+    @classmethod
+    def of_one_strip(
+        cls, t: np.ndarray, points: np.ndarray, sigma_m: np.ndarray, sigmaz_m: float | np.ndarray = np.nan
+    ) -> Support:
+        """Return the support by points of one strip, which does not blur the head."""
+        return cls(t, points, sigma_m, np.full(len(t), sigmaz_m), np.tile([1.0, np.nan, 0.0], (len(t), 1)))
 
     @property
     def rms_m(self) -> float:
@@ -50,14 +56,9 @@ class Support:
         return float(np.sqrt(np.mean(self.sigma_m**2)))
 
     @property
-    def heights_m(self) -> np.ndarray:
-        """`sigmaz_m`, (n,), NaN if there is none."""
-        return np.full(len(self.t), np.nan) if self.sigmaz_m is None else self.sigmaz_m
-
-    @property
     def rmsz_m(self) -> float:
         """Standard error of the height of the whole line (RMS)."""
-        return float(np.sqrt(np.mean(self.heights_m**2)))
+        return float(np.sqrt(np.mean(self.sigmaz_m**2)))
 
     def between(self, start: float, end: float) -> Support:
         """Return the part from `start` to `end`, with at least one station; its chainages count from `start`."""
@@ -66,21 +67,13 @@ class Support:
         return self.select(inside, start)
 
     def select(self, which: np.ndarray, start: float) -> Support:
-        """Return the stations marked in `which`, (n,) bool; their chainages count from `start`."""
-        strips = None if self.strips is None else self.strips[which]
-        sigmaz_m = None if self.sigmaz_m is None else self.sigmaz_m[which]
-        return Support(self.t[which] - start, self.points[which], self.sigma_m[which], strips, sigmaz_m)
+        """Return some stations, by a mask, (n,) bool, or by their numbers; their chainages count from `start`."""
+        columns = (self.points, self.sigma_m, self.sigmaz_m, self.strips)
+        return Support(self.t[which] - start, *(column[which] for column in columns))
 
     def reversed(self, length_m: float) -> Support:
         """Return the support of the reversed line, given the line's length."""
-        strips = None if self.strips is None else self.strips[::-1]
-        sigmaz_m = None if self.sigmaz_m is None else self.sigmaz_m[::-1]
-        return Support(length_m - self.t[::-1], self.points[::-1], self.sigma_m[::-1], strips, sigmaz_m)
-
-    @property
-    def every_strip(self) -> np.ndarray:
-        """`strips`, (n, 3), also where all points are of one strip."""
-        return np.tile([1.0, np.nan, 0.0], (len(self.t), 1)) if self.strips is None else self.strips
+        return replace(self.select(np.arange(len(self.t))[::-1], 0.0), t=length_m - self.t[::-1])
 
 
 def _length(xyz: np.ndarray) -> float:

@@ -127,7 +127,7 @@ def _doubting(rail: RailLine, found: Sequence[tuple[np.ndarray, float]]) -> Rail
         return rail
     nearest = np.argmin(np.abs(support.t[:, None] - feet.t), axis=1)
     step_m = np.array([size_m for _, size_m in found])[feet.point][nearest]
-    strips = support.every_strip.copy()
+    strips = support.strips.copy()
     strips[:, 1], strips[:, 2] = np.fmax(strips[:, 1], step_m), np.hypot(strips[:, 2], 0.5 * step_m)
     support = replace(support, sigma_m=np.hypot(support.sigma_m, 0.5 * step_m), strips=strips)
     return replace(rail, sigma_mm=1000 * support.rms_m, support=support)
@@ -153,7 +153,7 @@ def _steps_along(line: np.ndarray, support: Support | None = None) -> tuple[np.n
     )
     variance = np.zeros(len(t))
     if support is not None:
-        variance = np.interp(t, support.t, np.maximum(support.sigma_m**2 - support.every_strip[:, 2] ** 2, 0.0))
+        variance = np.interp(t, support.t, np.maximum(support.sigma_m**2 - support.strips[:, 2] ** 2, 0.0))
     chance = np.sqrt(uniform_filter1d(variance, len(weights))[half:-half])
     return places[half:-half], across, BEND_M2 * np.abs(bend), chance
 
@@ -174,7 +174,7 @@ def _weights() -> tuple[np.ndarray, np.ndarray]:
 def warn_of_strips(rails: Sequence[RailLine], parameters: Parameters, progress: Progress) -> None:
     """Warn the user if strips, the passes of a scanner, differ."""
     shown = np.concatenate(
-        [rail.support.every_strip[:, :2] for rail in rails if rail.support is not None] or [np.empty((0, 2))]
+        [rail.support.strips[:, :2] for rail in rails if rail.support is not None] or [np.empty((0, 2))]
     )
     count, spread_m = shown[np.nan_to_num(shown[:, 1]) >= STRIP_OFF_M].T
     if STATION_STEP_M * np.sum(count > 1) >= MIN_STRIPS_APART_M:

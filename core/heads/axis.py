@@ -108,10 +108,12 @@ class Axis:
         by_chance = self.course.sigma(t) ** 2
         bridge_m = np.minimum(bridge_error(t[self.shown.information > 0], t, UNSEEN_TURN), UNSHOWN_M)
         remainder = np.maximum(self.course.at(t) ** 2 - by_chance, 0.0)
-        support = Support(t, self.shown.points, np.sqrt(by_chance + remainder + self.shown.common_m**2 + bridge_m**2))
-        if self.flank is not None:
-            return replace(support, sigmaz_m=np.full(len(t), FLANK_TOP_SIGMA_M))
-        return support if marked else _with_blur(support, self.shown.outline.blur, self.shown.outline.blur_up)
+        sigma_m = np.sqrt(by_chance + remainder + self.shown.common_m**2 + bridge_m**2)
+        top_m = np.nan if self.flank is None else FLANK_TOP_SIGMA_M
+        support = Support.of_one_strip(t, self.shown.points, sigma_m, top_m)
+        if marked or self.flank is not None:
+            return support
+        return _with_blur(support, self.shown.outline.blur, self.shown.outline.blur_up)
 
 
 def _means(points: HeadPoints) -> tuple[np.ndarray, np.ndarray]:

@@ -158,7 +158,7 @@ def _measured(
     resid = float(np.sqrt(np.mean(supporting.across**2)))
     support = axis.support(strips is not None)
     error_m = top.height_error(support)
-    support = replace(support, sigmaz_m=np.hypot(error_m, np.nan_to_num(support.heights_m)))
+    support = replace(support, sigmaz_m=np.hypot(error_m, np.nan_to_num(support.sigmaz_m)))
     if strips is not None:
         support = strips.added_to(support, parameters.align)
     support = support.between(start, end)
@@ -214,10 +214,10 @@ def measure_again(
 def _with_strips_of(rail: RailLine, support: Support | None) -> Support | None:
     """Keep the strips that the rail was measured with before: more of its surroundings were seen then."""
     before = rail.support
-    if before is None or before.strips is None or support is None:
+    if before is None or support is None:
         return support
     strips = before.strips[np.searchsorted(0.5 * (before.t[1:] + before.t[:-1]), support.t)]
-    own = np.sqrt(np.maximum(support.sigma_m**2 - support.every_strip[:, 2] ** 2, 0.0))
+    own = np.sqrt(np.maximum(support.sigma_m**2 - support.strips[:, 2] ** 2, 0.0))
     return replace(support, sigma_m=np.hypot(own, strips[:, 2]), strips=strips)
 
 
@@ -225,7 +225,7 @@ def _unsupported(rail: RailLine, head_width_m: float) -> RailLine:
     """Mark a rail as supported nowhere."""
     length_m = rail.line.length_m
     t = stations_along(length_m)
-    support = Support(t, np.zeros(len(t), dtype=int), np.full(len(t), unseen_m(head_width_m)))
+    support = Support.of_one_strip(t, np.zeros(len(t), dtype=int), np.full(len(t), unseen_m(head_width_m)))
     return replace(rail, gaps=np.array([[0.0, length_m]]), support=support)
 
 

@@ -157,7 +157,7 @@ class StripOffsets:
         return replace(
             support,
             sigma_m=np.hypot(support.sigma_m, error_m),
-            sigmaz_m=np.hypot(support.heights_m, up_m),
+            sigmaz_m=np.hypot(support.sigmaz_m, up_m),
             strips=strips,
         )
 

@@ -84,7 +84,6 @@ class Bridge:
 def bridge(
     one: np.ndarray,
     other: np.ndarray,
-    held: bool = False,
     misfit_m: float = MISFIT_M,
     transition_m: float = TRANSITION_M,
 ) -> Bridge | None:
@@ -94,8 +93,7 @@ def bridge(
     neighbouring rail is refused because it needs two opposite bends. None if the curve misses either line by a median
     of more than `misfit_m`, bends more than a rail, or would have to turn back along a line.
 
-    The first line is not cut if it is `held`. `transition_m` is the shortest length in which the curvature may rise
-    from 0 to 1 / `MIN_RADIUS_M`.
+    `transition_m` is the shortest length in which the curvature may rise from 0 to 1 / `MIN_RADIUS_M`.
     """
     before, after = even_points(one, FIT_M)[::-1], even_points(other, FIT_M)
     origin, axes = _frame(before, after)
@@ -110,7 +108,7 @@ def bridge(
     allowed = max(misfit_m, STAIRS_M * (1 - gap / (2 * FIT_M)))
     if misfit > allowed or bend > 1:
         return None
-    cut_before, cut_after = 0 if held else _astray(off[0][::-1]), _astray(off[1])
+    cut_before, cut_after = _astray(off[0][::-1]), _astray(off[1])
     first, last = before[-1 - cut_before, 0], after[cut_after, 0]
     x = np.linspace(first, last, int((last - first) / STEP_M) + 2)[1:-1]
     points = origin + np.column_stack([x, _basis(x) @ cubic]) @ axes
@@ -136,7 +134,7 @@ def _frame(before: np.ndarray, after: np.ndarray) -> tuple[np.ndarray, np.ndarra
     return (before[-1] + after[0]) / 2, np.array([along, [-along[1], along[0]]])
 
 
-def _fit(points: np.ndarray, transition_m: float = TRANSITION_M) -> np.ndarray:
+def _fit(points: np.ndarray, transition_m: float) -> np.ndarray:
     """Fit y(x) robustly with the curvature of rails as prior: value, slope, curvature and its change at x = 0."""
     basis, y = _basis(points[:, 0]), points[:, 1]
     prior = np.diag([0.0, 0.0, 1.0, transition_m]) * STAIRS_M * MIN_RADIUS_M

@@ -44,13 +44,12 @@ def _with_figures(parts: Sequence[RailLine], xyz: np.ndarray) -> RailLine:
     supports = [part.support for part in parts if part.support is not None]
     support, sigma_mm, sigmaz_mm = None, parts[0].sigma_mm, parts[0].sigmaz_mm
     if len(supports) == len(parts):
-        several = any(one.strips is not None for one in supports)
         support = Support(
             np.concatenate([one.t + start for one, start in zip(supports, starts)]),
             np.concatenate([one.points for one in supports]),
             np.concatenate([one.sigma_m for one in supports]),
-            np.concatenate([one.every_strip for one in supports]) if several else None,
-            np.concatenate([one.heights_m for one in supports]),
+            np.concatenate([one.sigmaz_m for one in supports]),
+            np.concatenate([one.strips for one in supports]),
         )
         if len(support.t):
             sigma_mm, sigmaz_mm = 1000 * support.rms_m, 1000 * support.rmsz_m

@@ -189,7 +189,7 @@ def _height_sigma_of_both(rails: Sequence[RailLine], left: Meeting, right: Meeti
 
     That of one rail: what hides heads, such as trains and roads, hides both, and passes are off in height alike.
     """
-    squares = [_sigma(rails, side, "sigmaz_mm", "heights_m") ** 2 for side in (left, right)]
+    squares = [_sigma(rails, side, "sigmaz_mm", "sigmaz_m") ** 2 for side in (left, right)]
     return np.sqrt(np.mean(squares, axis=0))
 
 
@@ -198,7 +198,7 @@ def _strips(rails: Sequence[RailLine], side: Meeting) -> np.ndarray:
     found = np.tile([1.0, np.nan, 0.0], (len(side.t), 1))
     for number in np.unique(side.rail):
         mine, support = (side.rail == number) & np.isfinite(side.t), rails[number].support
-        if support is not None and support.strips is not None:
+        if support is not None:
             found[mine] = support.strips[_nearest(support.t, side.t[mine])]
     return found
 

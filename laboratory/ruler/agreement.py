@@ -70,6 +70,6 @@ def _sigmas(rails: Sequence[RailLine], chords: Chords, chosen: np.ndarray) -> np
         if support is None:
             raise ValueError(f"The rail {rails[rail].rail_id} has no standard error.")
         mine = number == rail
-        for line, values in zip(found, (support.sigma_m, support.heights_m)):
+        for line, values in zip(found, (support.sigma_m, support.sigmaz_m)):
             line[mine] = np.interp(t[mine], support.t, values)
     return found

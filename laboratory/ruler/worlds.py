@@ -292,7 +292,7 @@ class _Ruler:
             mine = self.found.line == number
             if rail.support is not None:
                 across[mine] = np.interp(self.found.t[mine], rail.support.t, rail.support.sigma_m)
-                height[mine] = np.interp(self.found.t[mine], rail.support.t, rail.support.heights_m)
+                height[mine] = np.interp(self.found.t[mine], rail.support.t, rail.support.sigmaz_m)
         return across, height
 
     def faults(self) -> Iterator[tuple[Fault, float]]:

@@ -55,7 +55,7 @@ def geometry_of(xyz, chainage_m, track_id=1, **profiles):
 def support_of(length_m, sigma_m=0.001, points=10, step_m=0.25):
     """Evidence for a rail at stations along it: as many points at each, and their standard error."""
     t = np.arange(step_m / 2, length_m, step_m)
-    return Support(t, np.full(len(t), points), np.full(len(t), sigma_m))
+    return Support.of_one_strip(t, np.full(len(t), points), np.full(len(t), sigma_m))
 
 
 def network_of(*lines):

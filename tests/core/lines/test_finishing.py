@@ -53,22 +53,22 @@ def test_vertices_counts_and_gaps_of_two_pieces_are_those_of_the_whole():
 
 def supported(start_m, end_m, sigma_m, strips=None):
     t = np.arange(0.5, end_m - start_m)
-    one = Support(t, np.full(len(t), 7), np.full(len(t), sigma_m), strips and np.full((len(t), 3), strips))
-    return replace(piece(start_m, end_m), support=replace(one, sigmaz_m=np.full(len(t), 2 * sigma_m)))
+    one = Support.of_one_strip(t, np.full(len(t), 7), np.full(len(t), sigma_m), 2 * sigma_m)
+    return replace(piece(start_m, end_m), support=replace(one, strips=np.full((len(t), 3), strips)) if strips else one)
 
 
 def test_supports_follow_each_other_and_sigma_is_that_of_the_whole():
     whole = united([supported(0, 10, 0.003), supported(10, 40, 0.005)])
     np.testing.assert_allclose(whole.support.t, np.arange(0.5, 40))
     np.testing.assert_allclose(whole.support.sigma_m, [0.003] * 10 + [0.005] * 30)
-    assert whole.support.points.sum() == 280 and whole.support.strips is None
+    assert whole.support.points.sum() == 280 and (whole.support.strips[:, 0] == 1).all()
     assert whole.sigma_mm == pytest.approx(np.sqrt((9 + 3 * 25) / 4))
     assert whole.sigmaz_mm == pytest.approx(2 * np.sqrt((9 + 3 * 25) / 4))
     marked = united([supported(0, 10, 0.003, 2.0), supported(10, 40, 0.005)])
     assert marked.support.strips[9].tolist() == [2.0] * 3 and marked.support.strips[10, 0] == 1.0
     partly = united([supported(0, 10, 0.003), piece(10, 20)])
     assert partly.support is None and partly.sigma_mm == 2.0
-    empty = Support(*np.empty((3, 0)))
+    empty = Support.of_one_strip(*np.empty((3, 0)))
     assert united([replace(piece(0, 10), support=empty), replace(piece(10, 20), support=empty)]).sigma_mm == 2.0
 
 
@@ -105,7 +105,7 @@ def test_rails_with_a_corner_are_split_and_said(gaps):
     line = way([0, 0], [20, 0], [20, 10])
     xyz = np.column_stack([line, np.zeros(len(line))])
     t = np.arange(0.125, 30, 0.25)
-    support = Support(t, np.full(len(t), 10), np.where(t < 20, 0.001, 0.004))
+    support = Support.of_one_strip(t, np.full(len(t), 10), np.where(t < 20, 0.001, 0.004))
     rail = RailLine(xyz, 1, 10, 1200, 20.0, 2.0, 3.0, np.array(gaps), support)
     heard = Heard()
     one, other = finished([rail], Parameters(1.435, 0.072), heard)

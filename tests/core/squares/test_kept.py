@@ -16,9 +16,10 @@ from rail_extract.core.tiles.store import SpooledPoints
 
 FRAME = LocalFrame(np.array([500.0, 7100.0, 0.0]), 0.3048, 1.0, "EPSG:2227")
 XYZ = np.random.RandomState(2).uniform(-30, 30, (40, 3))
+SUPPORT = Support.of_one_strip(XYZ[:5, 0], np.arange(5.0), XYZ[:5, 1])
 RAILS = (
-    RailLine(XYZ, 3, 10, 417, 1.5, 0.4, 2.5, np.array([[1.0, 3.5]]), Support(XYZ[:5, 0], np.arange(5.0), XYZ[:5, 1])),
-    RailLine(XYZ, 4, 10, 9, 1.5, 0.4, 2.5, support=Support(XYZ[:5, 0], np.arange(5.0), XYZ[:5, 1], XYZ[:5])),
+    RailLine(XYZ, 3, 10, 417, 1.5, 0.4, 2.5, np.array([[1.0, 3.5]]), SUPPORT),
+    RailLine(XYZ, 4, 10, 9, 1.5, 0.4, 2.5, support=replace(SUPPORT, strips=XYZ[:5])),
     RailLine(XYZ[:7], 0, 11, 20.25, 0.0, 0.1, 0.0),
 )
 

@@ -20,7 +20,7 @@ def rail(xyz, gaps=()):
     """A rail with ten points per station."""
     length = length_along(xyz[:, :2])[-1]
     t = np.arange(0.125, length, 0.25)
-    support = Support(t, np.full(len(t), 10), np.full(len(t), 0.001))
+    support = Support.of_one_strip(t, np.full(len(t), 10), np.full(len(t), 0.001))
     gaps = np.array(gaps, dtype=float).reshape(-1, 2)
     return RailLine(xyz, 0, 10, 10 * len(t), 2.0, 1.0, float(np.sum(np.diff(gaps))), gaps, support)
 

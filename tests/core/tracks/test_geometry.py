@@ -96,8 +96,8 @@ def test_support_follows_the_chainage():
     """Gaps in one rail and few points on the other, along a centerline in the opposite direction."""
     left, right = Track(trace([Element(40.0)]), GAUGE + WIDTH).rails()
     stations = np.arange(0.125, 40, 0.25)
-    even = Support(stations, np.full(160, 10), np.full(160, 0.003))
-    uneven = Support(stations, np.where(stations < 20, 10, 2), np.where(stations < 20, 0.004, 0.008))
+    even = Support.of_one_strip(stations, np.full(160, 10), np.full(160, 0.003))
+    uneven = Support.of_one_strip(stations, np.where(stations < 20, 10, 2), np.where(stations < 20, 0.004, 0.008))
     first, second = rails_of(left, right)
     first = replace(first, gaps=np.array([[5.1, 8.1]]), support=even)
     second = replace(second, support=uneven)

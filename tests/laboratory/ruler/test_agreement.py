@@ -11,7 +11,7 @@ def rail(offset_m, up_m, sigma_m=0.003, sigmaz_m=0.004, left_m=0.0):
     t = np.arange(0.0, 60.01, 0.5)
     xyz = np.column_stack([t, left_m + offset_m(t), up_m(t)])
     sigma = np.full(len(t), sigma_m)
-    support = Support(t, np.ones(len(t), dtype=int), sigma, sigmaz_m=np.full(len(t), sigmaz_m))
+    support = Support.of_one_strip(t, np.ones(len(t), dtype=int), sigma, sigmaz_m)
     return RailLine(xyz, 1, 10, 100.0, 1.0, 1.0, 0.0, support=support)
 
 

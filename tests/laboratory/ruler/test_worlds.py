@@ -27,7 +27,7 @@ def network_of(world, lines, sigma_m=0.001):
     rails = []
     for number, line in enumerate(lines, start=1):
         t = np.linspace(0, np.hypot(*np.diff(line[:, :2], axis=0).T).sum(), 50)
-        support = Support(t, np.full(50, 100), np.full(50, sigma_m), None, np.full(50, sigma_m))
+        support = Support.of_one_strip(t, np.full(50, 100), np.full(50, sigma_m), sigma_m)
         rails.append(RailLine(line, number, 10, 5000, 1.0, 1000 * sigma_m, 0.0, support=support))
     middle = 0.5 * (world.scene.rails[0] + world.scene.rails[1])
     ids = tuple(rail.rail_id for rail in rails)
