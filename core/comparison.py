@@ -16,6 +16,7 @@ from .parameters import ComparisonParameters
 from .polyline import Chords, Polyline, cross, runs
 from .progress import SILENT, Progress
 from .rails import RailLine, cell_borders
+from .spread import known, rms, sigma_by_median
 from .tracks.parallels import most_common_spacing
 
 BOTH, MISSING, EXTRA = "both", "missing", "extra"
@@ -34,9 +35,6 @@ SURE = 3.0
 
 LEAST_SIGMA_M = 0.001
 """Smallest standard error that is estimated from the scatter of the differences: no survey of a track is better."""
-
-NORMAL = 1.4826
-"""Standard deviation of normally distributed values divided by the median of their absolute values."""
 
 STATIONS_AT_ONCE = 1_000
 """Stations compared between two checks for cancellation."""
@@ -103,7 +101,9 @@ class Survey:
 
         A centerline averages the errors of two rails across; in height, what hides one rail hides the other as well.
         """
-        across, height = (_rms([getattr(rail, name) for rail in self.rails]) for name in ("sigma_mm", "sigmaz_mm"))
+        across, height = (
+            rms(np.array([getattr(rail, name) for rail in self.rails])) for name in ("sigma_mm", "sigmaz_mm")
+        )
         of_rails = across / np.sqrt(2) / 1000, height / 1000
         first, second = (
             next((one for one in (own, self.sigma_m, rail) if np.isfinite(one)), np.nan)
@@ -340,8 +340,8 @@ def _without_shift(line: LineDifferences, shift: Shift) -> LineDifferences:
 def _scatter(lines: Sequence[LineDifferences], value: str, shift: str) -> float:
     """Return the standard error that the differences show apart from the shift, metres: robust against movements."""
     rest = np.concatenate([getattr(line, value) - getattr(line, shift) for line in lines])
-    rest = rest[np.isfinite(rest)]
-    return max(NORMAL * float(np.median(np.abs(rest))) / 1000, LEAST_SIGMA_M) if len(rest) else np.nan
+    rest = known(rest)
+    return max(sigma_by_median(rest) / 1000, LEAST_SIGMA_M) if len(rest) else np.nan
 
 
 def _judged(
@@ -419,11 +419,6 @@ class _Gauges:
             after = spacing_and_cant(moved + to_left_m, moved - to_right_m, self.chords[1])
             changes = np.where(known[:, None], after - before, changes)
         return changes[:, 0], changes[:, 1]
-
-
-def _rms(values: Sequence[float]) -> float:
-    known = np.array([value for value in values if np.isfinite(value)])
-    return float(np.sqrt(np.mean(known**2))) if len(known) else np.nan
 
 
 def cut(lines: Sequence[np.ndarray]) -> Chords:

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..polyline import Polyline
+from ..spread import sigma_by_median
 from .guide_line import STATION_M, Corridor
 
 HALF_M = 1.25
@@ -294,7 +295,7 @@ def measure(corridor: Corridor, shape: RidgeShape, shows: np.ndarray | None) -> 
     best = int(np.argmax([one.both[0] for one in fits]))
     height_m = float(np.clip(fits[best].height[0], LOWEST * shape.height_m, HIGHEST * shape.height_m))
     residual = height - mean[0][np.clip(np.floor((across + HALF_M) / PROFILE_BIN_M).astype(np.int64), 0, bins - 1)]
-    noise_m = 1.4826 * float(np.median(np.abs(residual - np.median(residual)))) if len(residual) else shape.noise_m
+    noise_m = sigma_by_median(residual - np.median(residual)) if len(residual) else shape.noise_m
     found = RidgeShape(
         shape.spacing_m, tried[best].width_m, height_m, max(noise_m, 0.01), SECTION_ROUGH_M, SECTION_SPREAD
     )

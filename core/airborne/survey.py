@@ -12,6 +12,7 @@ from ..errors import CloudError
 from ..frame import LocalFrame
 from ..parameters import AirborneParameters
 from ..polyline import length_along
+from ..spread import rms
 from ..standards import GAUGE_RANGE_MM, STANDARDS
 from .fitting import BED_SIGMA_M, REASONS, SEEN, Fitted, TrackStations
 from .guide_line import STATION_M
@@ -269,8 +270,8 @@ def lines_of(
                     track.guide_id,
                     float(length_along(xyz)[-1]),
                     float(seen.sum() * STATION_M),
-                    _rms(track.sigma_mm[part][seen]),
-                    _rms(track.sigmaz_mm[part][seen]),
+                    rms(track.sigma_mm[part][seen]),
+                    rms(track.sigmaz_mm[part][seen]),
                     1000 * track.guide.gauge_m if track.guide.gauge_m else gauge_mm,
                     track.name,
                     track.ref,
@@ -297,10 +298,6 @@ def _drawn(track: AirborneTrack, part: slice) -> np.ndarray:
     count = int(np.ceil((s_m[-1] - s_m[0] + STATION_M) / VERTEX_M))
     at = np.linspace(s_m[0] - STATION_M / 2, s_m[-1] + STATION_M / 2, count + 1)
     return CubicSpline(s_m, track.xyz[part])(at)
-
-
-def _rms(values: np.ndarray) -> float:
-    return float(np.sqrt(np.mean(values**2)))
 
 
 def joined_others(places: np.ndarray) -> tuple[OtherTrack, ...]:

@@ -13,14 +13,13 @@ from scipy import sparse
 from scipy.linalg import cholesky_banded, toeplitz
 from scipy.optimize import nnls
 
+from ..spread import sigma_by_median
+
 LENGTHS_M = (3.0, 4.0, 5.0, 6.5, 8.0, 10.0, 12.0, 15.0, 18.0, 22.0, 27.0)
 """Correlation lengths of the misalignment that are tried, metres: track is out of line over 5 to 30 m."""
 
 LAGS = 30
 """Number of lags at which the covariance of the residuals is compared."""
-
-MEDIAN_SHARE = 0.6745
-"""Median of the size of normal errors, in units of their standard deviation."""
 
 FAR = 4.0
 """Distance in correlation lengths beyond which the misalignment is independent: the correlation is below 1e-6, so that
@@ -103,7 +102,7 @@ def independent_m(s: np.ndarray, y: np.ndarray) -> float:
     """Return the standard deviation of errors that neighbours do not share, from each point and the four around it."""
     if len(s) < 2 * SIZES[0]:
         return 0.0
-    return float(np.median(np.abs(off_neighbours(s, y)))) / MEDIAN_SHARE
+    return sigma_by_median(off_neighbours(s, y))
 
 
 def strays(s: np.ndarray, y: np.ndarray, limit_m: float) -> np.ndarray:

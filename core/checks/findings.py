@@ -14,6 +14,7 @@ import numpy as np
 from ..polyline import Polyline
 from ..progress import counted, metres
 from ..rails import STRIP_OFF_M, Centerline, HeadWidths, RailLine, RailNetwork, TrackGeometry, cell_borders
+from ..spread import known, median, rms
 from .doubts import ARM_M, find_jumps
 
 GAUGE_OFF_MM = 10.0
@@ -292,26 +293,6 @@ def _places(geometry: TrackGeometry, doubt: Doubt, doubtful: np.ndarray, merge_m
     for mine in np.split(np.arange(len(numbers)), apart):
         length_m = geometry.cells_m[numbers[mine]].sum()
         yield DoubtfulPlace(geometry.track_id, doubt, float(starts[mine[0]]), float(ends[mine[-1]]), float(length_m))
-
-
-def known(values: np.ndarray) -> np.ndarray:
-    """Return the values that are numbers, (k,)."""
-    return values[np.isfinite(values)]
-
-
-def median(values: np.ndarray) -> float:
-    """Return the median of the known values; NaN without any."""
-    return float(np.median(known(values))) if known(values).size else np.nan
-
-
-def rms(values: np.ndarray) -> float:
-    """Return the root mean square of the known values; NaN without any."""
-    return float(np.sqrt(np.mean(known(values) ** 2))) if known(values).size else np.nan
-
-
-def largest(values: np.ndarray) -> float:
-    """Return the known value that is furthest from 0, with its sign; NaN without any."""
-    return float(max(known(values).tolist(), key=abs, default=np.nan))
 
 
 @dataclass(frozen=True)

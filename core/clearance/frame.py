@@ -17,6 +17,7 @@ from scipy.spatial import cKDTree
 
 from ..polyline import STATION_M, Chords, Polyline, interpolate
 from ..rails import Centerline, RailLine
+from ..spread import rms
 
 STEP_M = 0.5
 """Distance of the stations: an arc between them is within 0.1 mm of its chord from radius 300 m on."""
@@ -213,5 +214,5 @@ def _filled(t: np.ndarray, values: np.ndarray, default: float) -> np.ndarray:
 
 def _mean_error(values_mm: Sequence[float], default_m: float, factor: float = 1.0) -> float:
     """Return the root mean square of stated errors, metres; a default if none is stated."""
-    known = np.array([value for value in values_mm if np.isfinite(value) and value > 0])
-    return factor * float(np.sqrt(np.mean(known**2))) / 1000 if len(known) else default_m
+    mean_mm = rms(np.array([value for value in values_mm if value > 0]))
+    return default_m if np.isnan(mean_mm) else factor * mean_mm / 1000

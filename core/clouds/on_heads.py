@@ -12,6 +12,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..kernels import threads
+from ..spread import sigma_by_median
 from .points import RailPoints
 
 PLACE_M = 0.25
@@ -175,7 +176,7 @@ def on_heads(xyz: np.ndarray, found: bool = False) -> np.ndarray:
     for edge in faces.astype(np.float32).T:
         np.fmin(off_m, np.abs(across_m - edge[place]), out=off_m)
     on_faces = (depth_m > FACE_M[0]) & (depth_m <= FACE_M[1]) & np.isfinite(off_m)
-    scatter_m = 1.4826 * float(np.median(off_m[on_faces])) if on_faces.any() else np.inf
+    scatter_m = sigma_by_median(off_m[on_faces]) if on_faces.any() else np.inf
     recessed = (off_m > RECESS_M[0] + SCATTER_SIGMAS * scatter_m) & (off_m < RECESS_M[1])
     recessed &= depth_m > FACE_M[1] + noise_m
     return ~((recessed | (depth_m > head_m)) & (depth_m <= RAIL_M))
@@ -210,7 +211,7 @@ def _seen_at(xy: np.ndarray, points: np.ndarray) -> tuple[Places, np.ndarray, np
 def _noise(depth_m: np.ndarray) -> float:
     """Return the noise of heights, metres: above the crown, nothing else spreads the points of heads; depths, (n,)."""
     above_m = -depth_m[(depth_m < 0) & (depth_m > -HEAD_M)]
-    return 1.4826 * float(np.median(above_m)) if len(above_m) else 0.0
+    return sigma_by_median(above_m) if len(above_m) else 0.0
 
 
 def _crowns(place: np.ndarray, across: np.ndarray, z: np.ndarray, places: int) -> np.ndarray:

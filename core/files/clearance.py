@@ -14,6 +14,7 @@ from ..clearance.platforms import nominal_mm
 from ..clearance.wires import grade_pm
 from ..fields import CLEARANCE, INTRUSIONS, PLATFORMS, SIDES, WIRES
 from ..kilometres.axes import PlacedAxes
+from ..spread import known, rms
 from .layers import Layer
 
 FLATTEST_M = 10_000.0
@@ -90,8 +91,8 @@ def platforms_layer(found: Clearance, axes: PlacedAxes | None) -> Layer:
             **dict(zip(("offset_mm", "offmin_mm", "offmax_mm"), _mean_and_ends(np.abs(one.v)))),
             **dict(zip(("height_mm", "hmin_mm", "hmax_mm"), _mean_and_ends(one.w))),
             "nominal_mm": nominal_mm(one),
-            "sigma_mm": 1000 * np.hypot(_rms(one.sigma_m), found.courses[one.course].sigma_m),
-            "sigmaz_mm": 1000 * np.hypot(_rms(one.sigmaz_m), found.courses[one.course].cant_sigma_m),
+            "sigma_mm": 1000 * np.hypot(rms(one.sigma_m), found.courses[one.course].sigma_m),
+            "sigmaz_mm": 1000 * np.hypot(rms(one.sigmaz_m), found.courses[one.course].cant_sigma_m),
         }
         for number, (one, line) in enumerate(zip(found.platforms, lines), start=1)
     ]
@@ -109,7 +110,7 @@ def wires_layer(found: Clearance, axes: PlacedAxes | None) -> Layer:
             "stagmin_mm": 1000 * one.v.min(),
             "stagmax_mm": 1000 * one.v.max(),
             "grade_pm": grade_pm(one),
-            "sigma_mm": 1000 * _rms(one.sigma_m),
+            "sigma_mm": 1000 * rms(one.sigma_m),
         }
         for number, (one, line) in enumerate(zip(found.wires, lines), start=1)
     ]
@@ -121,10 +122,6 @@ def _line(found: Clearance, one: Trace) -> np.ndarray:
     return found.courses[one.course].places(one.s, one.v, one.w)
 
 
-def _rms(values: np.ndarray) -> float:
-    return float(np.sqrt(np.mean(values**2)))
-
-
 def _mean_and_ends(values_m: np.ndarray) -> tuple[float, float, float]:
     """Return mean, least and largest value, millimetres."""
     return 1000 * float(values_m.mean()), 1000 * float(values_m.min()), 1000 * float(values_m.max())
@@ -133,7 +130,7 @@ def _mean_and_ends(values_m: np.ndarray) -> tuple[float, float, float]:
 def _extent(found: Clearance, one: Trace, axes: PlacedAxes | None, line: np.ndarray) -> dict[str, Any]:
     """Return the track of what follows it, the chainages of its ends, its length, and its kilometres."""
     km = np.empty(0) if axes is None else axes.kilometres(found.frame.to_crs(line)[:, :2]).km
-    known = km[np.isfinite(km)]
-    km_from, km_to = (float(known.min()), float(known.max())) if len(known) else (None, None)
+    km = known(km)
+    km_from, km_to = (float(km.min()), float(km.max())) if len(km) else (None, None)
     columns = (found.courses[one.course].track_id, *one.ends, one.length_m, km_from, km_to)
     return dict(zip(("track_id", "from_m", "to_m", "length_m", "km_from", "km_to"), columns))

@@ -9,6 +9,8 @@ import numpy as np
 from numpy.polynomial import Polynomial
 from scipy.ndimage import median_filter, uniform_filter1d
 
+from ..spread import sigma_by_median
+
 LEVEL_BIN_M = 0.5
 """Length of the bins: a handful of points on the sparsest rail, and at most 2 cm of height at 4 % gradient."""
 
@@ -73,7 +75,7 @@ def robust_sigma(values: np.ndarray) -> float:
     """Estimate the standard deviation of values from their median absolute deviation, which outliers hardly affect."""
     if not len(values):
         return MIN_NOISE_M
-    return max(1.4826 * float(np.median(np.abs(values - np.median(values)))), MIN_NOISE_M)
+    return max(sigma_by_median(values - np.median(values)), MIN_NOISE_M)
 
 
 def cross_slope(t: np.ndarray, across: np.ndarray, height: np.ndarray, head_width_m: float) -> np.ndarray:

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
+from ..spread import sigma_by_median
 from .edges import VIEW_STATIONS
 from .head_points import ENOUGH_POINTS, HeadPoints, near_lines
 from .outline import CROWN_RADIUS_M, MIN_NOISE_M, Grid, Outline, Scores, Section, fit_section, log_likelihood
@@ -269,7 +270,7 @@ def _half_apart(above: np.ndarray) -> float:
     The fourth moment distinguishes two levels from noise: the sum of both has the fourth cumulant -2 d⁴.
     """
     above = above - np.median(above) if len(above) else above
-    above = above[np.abs(above) <= CORE_SIGMAS * 1.4826 * np.median(np.abs(above))] if len(above) else above
+    above = above[np.abs(above) <= CORE_SIGMAS * sigma_by_median(above)] if len(above) else above
     if len(above) < MIN_SECTION_POINTS:
         return 0.0
     variance = float(np.var(above))

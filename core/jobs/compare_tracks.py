@@ -113,6 +113,7 @@ def _figures(found: TrackComparison) -> dict[str, Any]:
     import numpy as np
 
     from ..comparison import BOTH, EXTRA, MISSING
+    from ..spread import rms
 
     across, height = (found.values(name) for name in ("across_mm", "height_mm"))
     east, north = 1000 * found.shift.plan_m if len(across) else (np.nan, np.nan)
@@ -121,8 +122,8 @@ def _figures(found: TrackComparison) -> dict[str, Any]:
         "MOVED_LENGTH": found.moved_m,
         "MISSING_LENGTH": found.length_of(MISSING),
         "EXTRA_LENGTH": found.length_of(EXTRA),
-        "ACROSS_RMS": np.sqrt(np.mean(across**2)) if len(across) else np.nan,
-        "HEIGHT_RMS": np.sqrt(np.mean(height**2)) if len(height) else np.nan,
+        "ACROSS_RMS": rms(across),
+        "HEIGHT_RMS": rms(height),
         "SHIFT_EAST": east,
         "SHIFT_NORTH": north,
         "SHIFT_UP": 1000 * found.shift.up_m,

@@ -78,7 +78,7 @@ def _figures(fits: Sequence[Fit]) -> dict[str, Any]:
     """Return the number of elements, and the root mean squares of slews, lifts and differences of cant, millimetres."""
     import numpy as np
 
-    from ..checks.findings import rms
+    from ..spread import rms
 
     found = {
         figure: rms(np.concatenate([getattr(fit.deviations, name) for fit in fits]))
@@ -90,7 +90,7 @@ def _figures(fits: Sequence[Fit]) -> dict[str, Any]:
 
 def _in_words(deviations: Deviations) -> str:
     """Return the root mean squares of a track, each with its direction; unknown ones are left out."""
-    from ..checks.findings import rms
+    from ..spread import rms
 
     found = ((rms(getattr(deviations, name)), where) for name, where in DIRECTIONS.values())
     return ", ".join(f"{one:.2f} mm {where}" for one, where in found if not math.isnan(one))

@@ -22,8 +22,8 @@ from ..alignment.elements import (
     stations_of,
 )
 from ..alignment.measured import Deviations
-from ..checks.findings import largest, rms
 from ..progress import metres
+from ..spread import largest, rms
 from ..tracks.geometry import GRADE_BASE_M, HALF_CHORD_M
 from .markup import figure, legend, made, page, section, table, tag, text, tiles
 from .page import stated

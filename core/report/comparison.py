@@ -6,9 +6,9 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from ..checks.findings import known, largest, rms
 from ..comparison import BOTH, EXTRA, MISSING, SURE, LineDifferences, TrackComparison
 from ..progress import metres
+from ..spread import known, largest, rms
 from .markup import figure, made, page, section, table, tag, text, tiles, verdict_box
 from .plots import LEFT, PANEL, RIGHT, SPACE, WIDTH, Curve, Frame, Panel, draw_panels, picture, round_up
 

@@ -22,9 +22,7 @@ from ..checks.findings import (
     Findings,
     TrackFindings,
     examine,
-    known,
     listed,
-    median,
     verdict,
 )
 from ..clouds.crs import parse_crs
@@ -32,6 +30,7 @@ from ..frame import LocalFrame
 from ..parameters import Parameters
 from ..progress import metres, written
 from ..rails import ENOUGH_CELLS_PER_M, RailNetwork, SearchFigures
+from ..spread import known, median
 from ..standards import Gauge, RailStandard
 from .limits import limits_table
 from .markup import figure, legend, made, note, page, section, table, tag, text, tiles, verdict_box

@@ -22,6 +22,7 @@ from ..parameters import Parameters
 from ..polyline import MIN_RING_M, Polyline
 from ..progress import SILENT, Progress
 from ..rails import Centerline, RailLine
+from ..spread import rms
 from ..standards import distinct_gauges
 from .chaining import MEETING_STEP_M, TrackChain, chain_pairs, provisional_centerline, runs_on, single_rail_limit
 from .midline import (
@@ -151,11 +152,11 @@ def _law(s: np.ndarray, off: np.ndarray) -> tuple[PartingLaw, np.ndarray]:
     """
     off = np.sign(off[-1]) * off
     arc, arc_misfit_m = _arc(s, off)
-    if _rms(arc_misfit_m) <= BENT_M:
+    if rms(arc_misfit_m) <= BENT_M:
         return arc, arc_misfit_m
     heels_m = np.arange(HEEL_STEP_M, s[-1] / 2, HEEL_STEP_M)
-    angle, angle_misfit_m = min((_angle(s, off, heel_m) for heel_m in heels_m), key=lambda found: _rms(found[1]))
-    if _rms(angle_misfit_m) < _rms(arc_misfit_m) / 2 and np.isfinite(angle.touch):
+    angle, angle_misfit_m = min((_angle(s, off, heel_m) for heel_m in heels_m), key=lambda found: rms(found[1]))
+    if rms(angle_misfit_m) < rms(arc_misfit_m) / 2 and np.isfinite(angle.touch):
         return angle, angle_misfit_m
     return arc, arc_misfit_m
 
@@ -176,10 +177,6 @@ def _angle(s: np.ndarray, off: np.ndarray, heel_m: float) -> tuple[PartingLaw, n
     terms = np.column_stack([np.ones_like(s), s, np.maximum(s - heel_m, 0.0) ** 2])
     (root, slope, bend), *_ = np.linalg.lstsq(terms, off, rcond=None)
     return PartingLaw(slope if bend > 0 else 0.0, root, STRAIGHT), np.abs(off - terms @ (root, slope, bend))
-
-
-def _rms(misfit_m: np.ndarray) -> float:
-    return float(np.sqrt(np.mean(misfit_m**2)))
 
 
 def _with_bridged(line: Centerline, xyz: np.ndarray) -> Centerline:
