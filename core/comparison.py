@@ -17,6 +17,7 @@ from .polyline import Chords, Polyline, cross, runs
 from .progress import SILENT, Progress
 from .rails import RailLine, cell_borders
 from .spread import known, rms, sigma_by_median
+from .standards import LEAST_ERROR_M
 from .tracks.parallels import most_common_spacing
 
 BOTH, MISSING, EXTRA = "both", "missing", "extra"
@@ -32,9 +33,6 @@ than a degree, and most crossings are steeper."""
 
 SURE = 3.0
 """Standard errors of a difference beyond which a track has moved: one in 370 is larger by chance."""
-
-LEAST_SIGMA_M = 0.001
-"""Smallest standard error that is estimated from the scatter of the differences: no survey of a track is better."""
 
 STATIONS_AT_ONCE = 1_000
 """Stations compared between two checks for cancellation."""
@@ -341,7 +339,7 @@ def _scatter(lines: Sequence[LineDifferences], value: str, shift: str) -> float:
     """Return the standard error that the differences show apart from the shift, metres: robust against movements."""
     rest = np.concatenate([getattr(line, value) - getattr(line, shift) for line in lines])
     rest = known(rest)
-    return max(sigma_by_median(rest) / 1000, LEAST_SIGMA_M) if len(rest) else np.nan
+    return max(sigma_by_median(rest) / 1000, LEAST_ERROR_M) if len(rest) else np.nan
 
 
 def _judged(

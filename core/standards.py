@@ -151,6 +151,9 @@ def _standards() -> dict[str, RailStandard]:
     return table
 
 
+LEAST_ERROR_M = 0.001
+"""Least standard deviation of a track across and in height: no survey is better."""
+
 SAME_GAUGE_M = 0.02
 """Largest deviation of a measured gauge from a nominal one: half the difference between the closest two, and worn track
 deviates less."""

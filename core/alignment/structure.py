@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..progress import SILENT, Progress
+from ..standards import LEAST_ERROR_M
 from .chain import NOTHING, Chain, Held, Samples, Span, assembled, fitted, residuals, start_of
 from .noise import Noise, estimated, independent_m
 
@@ -89,14 +90,11 @@ SMOOTH = 0.2
 """Share of `SignalKind.shown_m` below which single points scatter only if the line was smoothed: errors of several
 lengths hang together then, and what the search takes for its noise is less than these."""
 
-LEAST_ERROR_M = 0.001
-"""Least standard deviation of a line across and in height, metres: no survey of a track is better. Where single points
-scatter by less, the line was smoothed, and what their errors lack is shared by neighbours: the bends of a smooth error
-would be taken for elements."""
-
 PLAN, HEIGHT = SignalKind(2, (1, 2, 3), True, LEAST_ERROR_M), SignalKind(2, (1, 2), False, LEAST_ERROR_M)
 CANT = SignalKind(1, (0, 1), False, shown_m=math.sqrt(2.0) * LEAST_ERROR_M)
-"""Kinds of signals. Cant is the difference of two heights."""
+"""Kinds of signals. Where single points scatter by less than any survey, the line was smoothed, and what their errors
+lack is shared by neighbours: the bends of a smooth error would be taken for elements. Cant is the difference of two
+heights."""
 
 
 @dataclass(frozen=True)

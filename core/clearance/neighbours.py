@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..polyline import Polyline, runs
-from .frame import STEP_M, Course
+from .frame import SPACING_M, STEP_M, Course
 from .settings import Settings
 
 REACH_M = 8.0
@@ -26,7 +26,7 @@ ERROR_M = 0.002
 TIGHT_M = (100, 120, 150, 170, 180, 200, 225, 250), (1.100, 0.700, 0.305, 0.215, 0.180, 0.120, 0.055, 0.0)
 """Radius, and what the least distance grows by there, metres (EBO annex 4)."""
 
-CANT_LEVER = 3.53 / 1.50
+CANT_LEVER = 3.53 / SPACING_M
 """Height of the widest place of a vehicle by the spacing of the rails: what the distance grows by, per metre by which
 the outer track has more cant (EBO annex 4)."""
 

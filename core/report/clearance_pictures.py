@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..clearance.along import Trace
-from ..clearance.intrusions import PLATFORM_WORDS, Intrusion
+from ..clearance.intrusions import PLATFORM_WORDS, UP_M, Intrusion
 from ..clearance.measure import BANDS_M, Clearance, Stations, read_points
 from ..clearance.sweep import SECTION_M, part_of
 from ..polyline import runs
@@ -30,9 +30,6 @@ RULES = ".crosses { display: grid; grid-template-columns: repeat(auto-fill, minm
 
 SCALE, HALF_M, HIGH_M = 60.0, 2.9, 5.6
 """Units per metre of a cross-section, and what it shows at least: half its width, and its height."""
-
-SURFACE_M = 0.35
-"""Half the length of the line that shows a fitted surface: that over which it is fitted."""
 
 PALETTE = ("#1565c0", "#2e7d4f", "#8e5bb5", "#b26a00", "#00838f", "#6d4c41")
 """Colours of the classes of points."""
@@ -165,7 +162,7 @@ def cross_section(found: Clearance, one: Slice) -> str:
     for v in (spacing / 2, -spacing / 2):
         parts.append(tag("rect", x=x(v) - 2.2, y=y(0.0), width=4.4, height=9.0, style="fill: var(--ink)"))
     place = one.intrusion
-    v, w, lean = place.v_mm / 1000, place.w_mm / 1000, SURFACE_M * np.array(place.lean)
+    v, w, lean = place.v_mm / 1000, place.w_mm / 1000, UP_M * np.array(place.lean)
     ends = [f"{x(v + sense * lean[0]):.1f} {y(w + sense * lean[1]):.1f}" for sense in (-1, 1)]
     parts.append(tag("path", d=f"M{ends[0]}L{ends[1]}", style="stroke: var(--offgauge); stroke-width: 2; fill: none"))
     parts.append(

@@ -15,13 +15,10 @@ from scipy.spatial import cKDTree
 from ..polyline import Polyline
 from ..rails import RailLine
 from .pairing import LEFT, MAX_OVERLAP_M, MIN_SECTION_M, RIGHT, RailPair
+from .parallels import MAX_TURN
 
 DIRECTION_M = 1.0
 """Length over which the direction of a section at its end is measured."""
-
-MAX_TURN = np.radians(10.0)
-"""Angle within which sections that continue each other point at each other, as the ends of rails do; in addition, they
-may miss each other by the tolerance of the gauge."""
 
 MIN_RADIUS_M = 25.0
 """Radius of the tightest tram curve in which a track may turn in a gap."""

@@ -19,11 +19,9 @@ from .chaining import MEETING_STEP_M
 from .midline import Meeting, Side, bridged_steps
 from .parallels import most_common_spacing
 
-MAX_EXTRAPOLATION_M = 1.5
-"""Distance from the nearest place with both rails up to which gauge and cant are given: half the base of a twist."""
-
 TWIST_BASE_M = 3.0
-"""Length over which the change of cant is stated, as in the standards for track geometry."""
+"""Length over which the change of cant is stated, as in the standards for track geometry. Up to half of it from the
+nearest place with both rails, gauge and cant are given."""
 
 HALF_CHORD_M = 10.0
 """Distance of the outer ones of the three points that define the radius: it is measured on a chord of 20 m."""
@@ -138,7 +136,7 @@ def _profile(along: np.ndarray, values: np.ndarray, chainage: np.ndarray) -> np.
     if not known.any():
         return np.full(len(chainage), np.nan)
     smooth = smooth_profile(along[known], values[known], PROFILE_SIGMA_M, chainage)
-    return np.where(distance_to(along[known], chainage) <= MAX_EXTRAPOLATION_M, smooth, np.nan)
+    return np.where(distance_to(along[known], chainage) <= 0.5 * TWIST_BASE_M, smooth, np.nan)
 
 
 def _radius(xy: np.ndarray, chainage: np.ndarray) -> np.ndarray:

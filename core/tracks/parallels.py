@@ -25,8 +25,9 @@ MAX_SPACING_M = 2.2
 MIN_SPACING_M = 0.45
 """Lines closer than this are not a track: the narrowest gauge is 500 mm, less its tolerance."""
 
-MAX_SINE = np.sin(np.radians(10.0))
-"""Sine of the angle from which rails cross: those of a track are parallel within ten degrees."""
+MAX_TURN = np.radians(10.0)
+"""Angle from which rails cross, those of a track being parallel within it; and within which sections that continue each
+other point at each other, as the ends of rails do, where they miss each other by the tolerance of the gauge at most."""
 
 SPACING_BIN_M = 0.01
 """Width of the bins in which the most common spacing is sought: the spacing of one track varies by less."""
@@ -94,7 +95,7 @@ def find_parallels(rails: Sequence[RailLine], reach_m: float = MAX_SPACING_M, pr
         along = np.einsum("ij,ij->i", between, tangents[p])
         left = np.einsum("ij,ij->i", between, normals[p])
         turn = tangents[p, 0] * tangents[q, 1] - tangents[p, 1] * tangents[q, 0]
-        abreast = (np.abs(along) <= SAMPLE_STEP_M / 2) & (np.abs(left) <= reach_m) & (np.abs(turn) < MAX_SINE)
+        abreast = (np.abs(along) <= SAMPLE_STEP_M / 2) & (np.abs(left) <= reach_m) & (np.abs(turn) < np.sin(MAX_TURN))
         p, q = p[abreast], q[abreast]
         same = np.einsum("ij,ij->i", tangents[p], tangents[q]) > 0
         found.append((number[p], number[q], t[p], t[q], left[abreast], same))
