@@ -24,7 +24,7 @@ from rail_extract.core.clearance.settings import Settings
 from rail_extract.core.clouds.points import ask
 from rail_extract.core.errors import Cancelled
 from rail_extract.core.progress import Progress
-from rail_extract.core.run.loop import Runner
+from rail_extract.core.run.tasks import Runner
 from rail_extract.laboratory.curves import Element
 from rail_extract.laboratory.scenes import clearance as scenes
 from scipy.ndimage import gaussian_filter1d

@@ -34,8 +34,7 @@ from rail_extract.core.progress import SILENT, Progress
 from rail_extract.core.rails import RailLine, Support
 from rail_extract.core.run import processes
 from rail_extract.core.run.cluster import Cluster, started
-from rail_extract.core.run.loop import Answer, Runner, next_of
-from rail_extract.core.run.tasks import Context, Once, Task
+from rail_extract.core.run.tasks import Answer, Context, Once, Runner, Task, next_of
 from rail_extract.core.squares.kept import KeptResults
 from rail_extract.core.squares.seams import SquareRails, trim
 from rail_extract.core.squares.steps import engine_for, square_side

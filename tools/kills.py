@@ -38,7 +38,7 @@ from rail_extract.core.labelling.files import Content, Labels, OutputFiles, writ
 from rail_extract.core.progress import SILENT
 from rail_extract.core.rails import RailLine
 from rail_extract.core.raster import rasterize
-from rail_extract.core.run.loop import Runner
+from rail_extract.core.run.tasks import Runner
 from rail_extract.core.standards import SEARCHED_CLASSES, resolve
 from rail_extract.rail_extract_plugin.algorithms import ALGORITHMS
 from rail_extract.rail_extract_plugin.dialog.parameter_values import ParameterValues

@@ -22,8 +22,7 @@ from ..parameters import AirborneParameters
 from ..polyline import Polyline
 from ..progress import SILENT, Progress
 from ..raster import ROW
-from ..run.loop import Runner
-from ..run.tasks import Context, Task
+from ..run.tasks import Context, Runner, Task
 from ..standards import STANDARDS
 from ..tiles.grid import Key
 from ..tiles.store import SortedFile, append, counts_of, files_of, read_stored

@@ -12,8 +12,7 @@ from ..clouds.points import Request
 from ..frame import LocalFrame
 from ..progress import SILENT, Progress
 from ..rails import Kilometres
-from ..run.loop import Runner
-from ..run.tasks import Context, Task
+from ..run.tasks import Context, Runner, Task
 from ..tiles.grid import Key
 from ..tiles.store import counts_of, read_stored
 from .along import Trace

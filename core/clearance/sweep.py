@@ -21,8 +21,7 @@ from ..clouds.header import CloudHeader
 from ..clouds.points import Request, read_each, touching
 from ..clouds.readers import read_classes
 from ..progress import SILENT, Progress, counted
-from ..run.loop import Runner
-from ..run.tasks import Context, version
+from ..run.tasks import Context, Runner, version
 from ..standards import LAST_CLASS
 from ..tiles.grid import Key
 from ..tiles.store import SortedFile, append, files_of, fingerprint, kept_points

@@ -12,8 +12,7 @@ import numpy as np
 from ..errors import CloudError, CrsError, EmptyCloudError, NoRailPointsError, ParameterError, UnclassifiedError
 from ..frame import ORIGIN_STEP, LocalFrame
 from ..progress import SILENT, Progress, counted
-from ..run.loop import Runner
-from ..run.tasks import READ_S, Task
+from ..run.tasks import READ_S, Runner, Task
 from ..standards import LAST_CLASS
 from .crs import common_crs, is_geographic, name_of, parse_crs, units, utm_zone, warn_of_scale
 from .mask import Mask

@@ -15,8 +15,8 @@ from ..errors import ParameterError, RailExtractError
 from ..jobs.extract_rails import JOB
 from ..parameters import Parameters
 from ..progress import Progress
-from ..run.loop import Runner
 from ..run.processes import workers
+from ..run.tasks import Runner
 from ..squares.kept import KeptResults
 from .files import FileValues
 from .jobs import console_of, declare, given_to, run_and_print

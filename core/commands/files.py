@@ -25,8 +25,8 @@ from ..jobs.outputs import WEB_PAGES
 from ..jobs.result import Result
 from ..jobs.values import Job, Values
 from ..progress import Progress
-from ..run.loop import Runner
 from ..run.processes import workers
+from ..run.tasks import Runner
 
 if TYPE_CHECKING:
     from ..jobs.features import FeatureSource

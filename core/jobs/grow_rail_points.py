@@ -112,7 +112,7 @@ def _run(values: Values, progress: Progress) -> Result:
     from ..grow.heads import GrowSettings
     from ..labelling.files import Content, plan_output
     from ..labelling.growing import grow_files
-    from ..run.loop import Runner
+    from ..run.tasks import Runner
 
     progress, standard = Estimating(progress), values.standard()
     choice = Content(values["RAIL_CLASS"], values.rails_only(), reset=False)

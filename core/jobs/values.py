@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from ..files.rail_rasters import RasterSource
     from ..kilometres.axes import PlacedAxes
     from ..progress import Progress
-    from ..run.loop import Runner
+    from ..run.tasks import Runner
     from .features import FeatureSource, PlacedFeatures
     from .lines import LayerLines, Rows
     from .result import Result

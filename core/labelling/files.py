@@ -19,8 +19,7 @@ from ..errors import DiskError, ParameterError, RailExtractError
 from ..grow.growth import Stop
 from ..progress import SILENT, Progress
 from ..rails import SearchFigures
-from ..run.loop import Runner
-from ..run.tasks import READ_S, Context, Task
+from ..run.tasks import READ_S, Context, Runner, Task
 from ..standards import RAIL_CLASS
 from .finding import find_rail_points, report
 

@@ -25,8 +25,7 @@ from ..frame import LocalFrame
 from ..learned.model import Classifier, label_square
 from ..progress import SILENT, Progress, counted
 from ..rails import ENOUGH_CELLS_PER_M, SearchFigures
-from ..run.loop import Runner
-from ..run.tasks import Context, Task
+from ..run.tasks import Context, Runner, Task
 from ..standards import LAST_CLASS
 from ..tiles.grid import Key, Square, Tiling
 from ..tiles.store import SortedFile, append, counts_of, files_of, read_stored, sources_among

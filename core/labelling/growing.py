@@ -23,7 +23,7 @@ from ..polyline import Polyline
 from ..progress import SILENT, Progress
 from ..rails import SearchFigures
 from ..raster import BORDER_CELLS, cell_size
-from ..run.loop import Runner
+from ..run.tasks import Runner
 from ..tiles.grid import Key
 from ..tiles.store import files_of, read_stored
 from .files import ClassifiedFiles, Content, Labels, OutputFiles, write_labelled

@@ -21,7 +21,7 @@ from ..kernels import device_of
 from ..learned.blocks import CHECKS, Examples, Plan, save_index, write_square
 from ..learned.model import WEIGHTS_SUFFIX, check_torch, load, save
 from ..progress import SILENT, Progress
-from ..run.loop import Runner
+from ..run.tasks import Runner
 from ..tiles.grid import Square
 from ..tiles.store import files_of, read_stored
 from .finding import POINT, sort_files

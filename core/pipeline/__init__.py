@@ -1,7 +1,7 @@
 """The one walk from rail points to 3D rails and track centerlines, in the order of the paper's abstract.
 
 It divides the work into tasks for a runner, which executes them one after another in this process or on many machines
-(see `run.loop`). The lines do not depend on the runner.
+(see `run.tasks`). The lines do not depend on the runner.
 """
 
 from __future__ import annotations
@@ -20,8 +20,7 @@ from ..heads.strips import strip_courses
 from ..parameters import ALIGNED, Parameters
 from ..progress import SILENT, Progress, Recording, counted
 from ..rails import Centerline, RailNetwork, TrackGeometry
-from ..run.loop import Runner
-from ..run.tasks import Context, Task
+from ..run.tasks import Context, Runner, Task
 from ..squares.remeasuring import measure_rails
 from ..squares.steps import engine_for, square_side
 from ..tiles.grid import MemorySource, PointSource, SortedPoints

@@ -16,8 +16,7 @@ from ..parameters import Parameters
 from ..progress import Progress, counted
 from ..rails import Centerline, RailLine, RailNetwork, SearchFigures
 from ..raster import RailRaster
-from ..run.loop import Runner
-from ..run.tasks import Context, Task
+from ..run.tasks import Context, Runner, Task
 from ..squares.seams import NO_KINDS, SquareRails, rows_in_frame
 from ..squares.steps import assembled, clean_square, engine_for, merged, rails_of_square, whole_rails
 from ..tiles.grid import (

@@ -22,8 +22,7 @@ from ..labelling.growing import grow_points
 from ..parameters import Parameters
 from ..progress import Progress
 from ..rails import SearchFigures
-from ..run.loop import Runner
-from ..run.tasks import Context
+from ..run.tasks import Context, Runner
 from ..squares.steps import square_side
 from ..standards import RAIL_CLASS
 from ..tiles.grid import SortedPoints, parted

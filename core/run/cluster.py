@@ -24,9 +24,8 @@ from ..disk import scratch_folder, sweep
 from ..errors import ParameterError, RailExtractError, WorkerError
 from ..kernels import ENVIRONMENT
 from ..progress import Progress
-from .loop import Answer, Executor, Heard, next_of
 from .processes import worker_count
-from .tasks import CORE, Context, Once, Task, version
+from .tasks import CORE, Answer, Context, Executor, Heard, Once, Task, next_of, version
 
 MAX_DEATHS = 10
 """Local workers that may die while they execute a task, for whatever reason, before the task is abandoned."""

@@ -15,8 +15,7 @@ from typing import Any
 from ..errors import RailExtractError, WorkerError
 from ..kernels import cores
 from ..progress import Progress, counted
-from .loop import Answer, Executor, InTurn, Keeping, Runner, next_of
-from .tasks import Task
+from .tasks import Answer, Executor, InTurn, Keeping, Runner, Task, next_of
 from .worker import Interpreter, Kind, Messages, Worker
 
 WORTH_S = 5.0

@@ -20,8 +20,7 @@ from queue import SimpleQueue
 from typing import Any, Callable
 
 from ..kernels import ENVIRONMENT
-from .loop import CHECK_EVERY_S, Answer, Heard
-from .tasks import Context, Once, Task
+from .tasks import CHECK_EVERY_S, Answer, Context, Heard, Once, Task
 
 PROGRAM = "import sys; sys.path[:] = sys.argv[1:]; from {} import serve; serve()"
 """Looks for modules where this process does: the current folder, which is the first place otherwise, may hold any."""

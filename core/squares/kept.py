@@ -48,11 +48,11 @@ class KeptResults:
             self._folder.mkdir(parents=True, exist_ok=True)  # not by workers: a failed run may have removed it
 
     def kept(self, task: Task) -> Task:
-        """See `run.loop.Keeping`."""
+        """See `run.tasks.Keeping`."""
         return replace(task, function=_kept, arguments=(task, str(self._folder)))
 
     def opened(self, result: Any) -> Any:
-        """See `run.loop.Keeping`."""
+        """See `run.tasks.Keeping`."""
         return load(result) if isinstance(result, Stored) else result
 
 

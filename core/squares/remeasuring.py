@@ -15,8 +15,7 @@ from ..lines.smoothing import GAP_SIGMAS, PROFILE_SIGMA_M
 from ..polyline import runs
 from ..progress import SILENT, Progress
 from ..rails import RailLine
-from ..run.loop import Runner
-from ..run.tasks import Context, Task
+from ..run.tasks import Context, Runner, Task
 from ..tiles.grid import Key, PointSource, Square, Tiling, drawn_from, lay_out
 
 CONTEXT_M = 10.0

@@ -18,7 +18,7 @@ from ...core.airborne.survey import SWITCH, AirborneSurvey, AirborneTrack, Guide
 from ...core.clouds.points import ask
 from ...core.parameters import AirborneParameters
 from ...core.polyline import Polyline
-from ...core.run.loop import Runner
+from ...core.run.tasks import Runner
 from ..airborne.catalogue import FlownScene
 from ..airborne.designs import SPACING_M, Design
 from ..airborne.write import ORIGIN, write_airborne

@@ -11,7 +11,7 @@ from ...core.clearance.measure import Clearance, measure
 from ...core.clearance.profiles import named
 from ...core.clearance.settings import Settings
 from ...core.clouds.points import ask
-from ...core.run.loop import Runner
+from ...core.run.tasks import Runner
 from ..scenes.clearance import courses_of, write_points
 from ..scenes.gauges import GaugeScene
 

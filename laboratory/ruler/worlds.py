@@ -25,7 +25,7 @@ from ...core.pipeline import extract_files
 from ...core.pipeline.sources import Classified, Raw
 from ...core.polyline import Chords, Polyline
 from ...core.rails import RailNetwork
-from ...core.run.loop import Runner
+from ...core.run.tasks import Runner
 from ...core.standards import RAIL_CLASS, SEARCHED_CLASSES
 from ..worlds.world import World
 from .lines import Match, match

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     import numpy as np
 
     from ...core.files.rail_rasters import RasterSource
-    from ...core.run.loop import Runner
+    from ...core.run.tasks import Runner
     from ..reading.layers import LayerSource
 
 TYPES_WITHOUT_LINES = (

@@ -12,7 +12,7 @@ from rail_extract.core.clouds.header import catalogue_text
 from rail_extract.core.clouds.points import ask
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.parameters import AirborneParameters
-from rail_extract.core.run.loop import Runner
+from rail_extract.core.run.tasks import Runner
 from rail_extract.laboratory.airborne.flight import AirborneCloud
 from rail_extract.laboratory.airborne.write import ORIGIN, las_of, write_airborne
 from rail_extract.laboratory.scenes.copc import write_copc

@@ -8,7 +8,7 @@ from rail_extract.core.clearance.measure import measure
 from rail_extract.core.clearance.profiles import named
 from rail_extract.core.clearance.settings import Settings
 from rail_extract.core.clouds.points import ask
-from rail_extract.core.run.loop import Runner
+from rail_extract.core.run.tasks import Runner
 from rail_extract.laboratory.scenes.clearance import courses_of, write_points
 
 

@@ -10,7 +10,7 @@ from rail_extract.core.clouds.points import ask
 from rail_extract.core.errors import Cancelled
 from rail_extract.core.jobs.clearance_inputs import custom
 from rail_extract.core.progress import Progress
-from rail_extract.core.run.loop import Runner
+from rail_extract.core.run.tasks import Runner
 from rail_extract.core.tiles.store import counts_of
 from rail_extract.laboratory.curves import Element
 from rail_extract.laboratory.scenes import clearance as scenes

@@ -11,7 +11,7 @@ from rail_extract.core.clouds.points import ask
 from rail_extract.core.pipeline import Parameters, extract_files
 from rail_extract.core.pipeline.sources import Grown, Raw
 from rail_extract.core.run import processes
-from rail_extract.core.run.loop import Runner
+from rail_extract.core.run.tasks import Runner
 from rail_extract.core.standards import SEARCHED_CLASSES
 from rail_extract.laboratory.scenes.las import write_las
 from rail_extract.laboratory.scenes.raw_shapes import MIDDLE, flat, rough, with_track

@@ -12,7 +12,7 @@ from rail_extract.core.disk import scratch_folder
 from rail_extract.core.errors import CloudError, DiskError, RailExtractError
 from rail_extract.core.labelling.files import Content, classify_files, plan_output
 from rail_extract.core.progress import Progress, Recording
-from rail_extract.core.run.loop import Answer, InTurn, Runner
+from rail_extract.core.run.tasks import Answer, InTurn, Runner
 from rail_extract.core.standards import SEARCHED_CLASSES
 from rail_extract.laboratory.scenes.raw_shapes import flat, rough, with_track
 

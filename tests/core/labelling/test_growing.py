@@ -14,7 +14,7 @@ from rail_extract.core.grow.start import find_start
 from rail_extract.core.labelling.files import Content, plan_output
 from rail_extract.core.labelling.growing import grow_files
 from rail_extract.core.parameters import GrowParameters
-from rail_extract.core.run.loop import Runner
+from rail_extract.core.run.tasks import Runner
 from rail_extract.core.standards import SEARCHED_CLASSES
 from rail_extract.laboratory.scenes.las import write_las
 from rail_extract.laboratory.scenes.raw_strips import GAUGE_M, SPACING_M, WIDTH_M, strip

@@ -13,7 +13,7 @@ from rail_extract.core.pipeline import Parameters, drawing, extract_files, extra
 from rail_extract.core.polyline import length_along, project
 from rail_extract.core.rails import SearchFigures
 from rail_extract.core.raster import cell_size, rasterize
-from rail_extract.core.run.loop import Runner
+from rail_extract.core.run.tasks import Runner
 from rail_extract.core.squares import steps
 from rail_extract.core.squares.steps import lines_of
 from rail_extract.core.standards import STANDARDS, RailStandard

@@ -10,7 +10,7 @@ from rail_extract.core.parameters import Parameters
 from rail_extract.core.pipeline import extract_files
 from rail_extract.core.pipeline.sources import Raw
 from rail_extract.core.progress import SILENT
-from rail_extract.core.run.loop import Answer, InTurn, Runner
+from rail_extract.core.run.tasks import Answer, InTurn, Runner
 from rail_extract.core.standards import SEARCHED_CLASSES
 from rail_extract.laboratory.scenes.las import write_las
 from rail_extract.laboratory.scenes.mixed import mixed

@@ -8,7 +8,7 @@ from rail_extract.core.clearance.settings import Settings
 from rail_extract.core.clouds.points import ask
 from rail_extract.core.report.clearance import clearance_page, summary, verdict
 from rail_extract.core.report.clearance_pictures import diagram, slices
-from rail_extract.core.run.loop import Runner
+from rail_extract.core.run.tasks import Runner
 from rail_extract.laboratory.curves import Element
 from rail_extract.laboratory.scenes import clearance as scenes
 

@@ -15,8 +15,7 @@ from rail_extract.core.pipeline.sources import Classified
 from rail_extract.core.progress import SILENT
 from rail_extract.core.rails import RailLine
 from rail_extract.core.run.cluster import Cluster, execute
-from rail_extract.core.run.loop import InTurn, Runner
-from rail_extract.core.run.tasks import Task, version
+from rail_extract.core.run.tasks import InTurn, Runner, Task, version
 from rail_extract.core.squares.kept import KeptResults
 from rail_extract.core.squares.steps import square_side
 from rail_extract.core.standards import STANDARDS

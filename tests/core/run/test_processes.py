@@ -18,9 +18,8 @@ from rail_extract.core.kernels import blas, one_thread
 from rail_extract.core.pipeline import Parameters, extract_files
 from rail_extract.core.pipeline.sources import Classified
 from rail_extract.core.run import processes as module
-from rail_extract.core.run.loop import Runner
 from rail_extract.core.run.processes import Processes, worker_count, workers
-from rail_extract.core.run.tasks import Task
+from rail_extract.core.run.tasks import Runner, Task
 from rail_extract.core.run.worker import Interpreter, Worker
 
 FUNCTIONS = """

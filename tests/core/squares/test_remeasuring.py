@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from built import cloud_of, rail_of, source_of
-from rail_extract.core.run.loop import Runner
+from rail_extract.core.run.tasks import Runner
 from rail_extract.core.squares.remeasuring import measure_rails
 
 WIDTH = 0.072

@@ -7,8 +7,7 @@ from heard import Heard
 from hypothesis import given
 from hypothesis import strategies as st
 from rail_extract.core.errors import Cancelled
-from rail_extract.core.run.loop import Runner
-from rail_extract.core.run.tasks import Once, Task
+from rail_extract.core.run.tasks import Once, Runner, Task
 from rail_extract.core.tiles.grid import around
 
 keys = st.sets(st.tuples(st.integers(-3, 3), st.integers(-3, 3)), min_size=1)
