@@ -18,9 +18,9 @@ from scipy.spatial import cKDTree
 
 from ..polyline import POINTS_AT_ONCE
 from ..progress import Progress
+from .along import ARMS_M, LIVE_M, away
 from .frame import Course
 from .settings import AROUND_M, Settings
-from .wires import ARMS_M, LIVE_M, away
 
 PLATFORM_WORDS, WIRE_WORDS, VEHICLE_WORDS = "platform", "contact wire", "vehicle on track {}"
 """What an object is, where that is known; such objects are named and not counted."""

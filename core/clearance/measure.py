@@ -15,7 +15,7 @@ from ..rails import Kilometres
 from ..run.tasks import Context, Runner, Task
 from ..tiles.grid import Key
 from ..tiles.store import counts_of, read_stored
-from .along import Trace
+from .along import LIVE_M, Trace, away, edges_of, nodes_of, on_platforms, platforms_of, wires_of
 from .frame import Course
 from .intrusions import (
     OTHER,
@@ -30,10 +30,8 @@ from .intrusions import (
     parts_of,
 )
 from .neighbours import Side, near, neighbours
-from .platforms import edges_of, on_platforms, platforms_of
 from .settings import EBO, LEAVE_OUT, Settings, widening
 from .sweep import HALO_M, POINT, SECTION_M, Swept, part_of, sweep
-from .wires import LIVE_M, away, nodes_of, wires_of
 
 MEASURE_S = 3e-6
 """Run time of a section per point, in seconds."""
@@ -202,7 +200,7 @@ def _stations(
 class Section:
     """What a section shows: least distances from the middle and margins, metres, and parts of objects.
 
-    `edges` and `nodes` are rows of `platforms.edges_of` and of `wires.nodes_of`; `has_vehicle` says whether the vehicle
+    `edges` and `nodes` are rows of `edges_of` and of `nodes_of`; `has_vehicle` says whether the vehicle
     of the scanner was left out.
     """
 

@@ -7,11 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from ..clearance.along import Trace, traced_at
+from ..clearance.along import Trace, grade_pm, nominal_mm, traced_at
 from ..clearance.measure import BANDS_M, Clearance, Stations
 from ..clearance.neighbours import Side
-from ..clearance.platforms import nominal_mm
-from ..clearance.wires import grade_pm
 from ..fields import CLEARANCE, INTRUSIONS, PLATFORMS, SIDES, WIRES
 from ..kilometres.axes import PlacedAxes
 from ..spread import known, rms

@@ -6,12 +6,10 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from ..clearance.along import traced_at
+from ..clearance.along import grade_pm, nominal_mm, traced_at
 from ..clearance.intrusions import VEHICLE_WORDS, Intrusion
 from ..clearance.measure import UNSEEN_SHARE, Clearance, Stations
-from ..clearance.platforms import nominal_mm
 from ..clearance.sweep import SECTION_M
-from ..clearance.wires import grade_pm
 from ..polyline import runs
 from ..progress import counted, metres, written
 from .clearance_pictures import RULES, Slice, cross_section, diagram

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from rail_extract.core.clearance.along import nominal_mm
 from rail_extract.core.clearance.measure import measure
-from rail_extract.core.clearance.platforms import nominal_mm
 from rail_extract.core.clearance.profiles import named
 from rail_extract.core.clearance.settings import LEAVE_OUT, Settings
 from rail_extract.core.clouds.points import ask
