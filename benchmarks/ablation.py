@@ -118,7 +118,7 @@ SWITCHES = (
     _rule("tracks.pairing._is_nearest", lambda *_: True),
     _rule("tracks.pairing.WANDER_WEIGHT", 0.0),
     _rule("tracks.parallels._is_crowded", none_of),
-    _rule("checks.lines._off_level_m", lambda *_: 0.0),
+    _rule("checks.warnings._off_level_m", lambda *_: 0.0),
     _rule("checks.doubts.find_jumps", nothing),
     _rule("classify.square.stands_free", lambda tops, band, marks, lines: all_of(lines)),
     _rule("classify.square.runs_inside", none_of),

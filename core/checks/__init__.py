@@ -10,9 +10,15 @@ from ..progress import Progress
 from ..rails import RailNetwork
 from ..tiles.grid import SortedPoints, drawn_from
 from .doubts import doubting_jumps, doubting_scatter, gauge_scatter, warn_of_strips
-from .lines import warn_of_blunt_lines, warn_of_rails, warn_of_split_classes, with_tracks
-from .points import warn_of_airborne, warn_of_unexplained
 from .standard import head_widths
+from .warnings import (
+    warn_of_airborne,
+    warn_of_blunt_lines,
+    warn_of_rails,
+    warn_of_split_classes,
+    warn_of_unexplained,
+    with_tracks,
+)
 
 
 def of(

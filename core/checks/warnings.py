@@ -1,25 +1,27 @@
-"""Warnings of what does not look like rails: of points before anything is computed, and of the lines that they gave.
+"""Warnings of what does not look like rails: points, before anything is computed, and the lines that they gave.
 
-Too few points for rails or too many; lone lines beside tracks, those of split classes, none at all, displaced ones."""
+Coordinates in another unit than the one that the file states, and points far from any rail, would take hours: the
+raster follows the points wherever they are. Lines may be lone ones beside tracks, of split classes, or displaced. See
+docs/method.md sections 1.3, 7.1 and 8.9.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
 from scipy.spatial import cKDTree
+
 from ..clouds.points import AIRBORNE
-from ..errors import CloudError
-from ..polyline import project, runs
-from ..progress import SILENT, Progress
-from ..rails import RailLine
-from ..tiles.grid import PointSource, Square, company_of, fullest
-import math
-from dataclasses import replace
-from ..errors import NoTrackError
+from ..errors import CloudError, NoTrackError
 from ..lines.smoothing import END_SHIFT, STATIONS_PER_SIGMA, filled, smooth_line
 from ..parameters import Parameters
-from ..polyline import Polyline
+from ..polyline import Polyline, project, runs
+from ..progress import SILENT, Progress
 from ..rails import Centerline, RailLine
+from ..tiles.grid import PointSource, Square, company_of, fullest
 from ..tracks.centerlines import tracks_of_class
 
 CELL_M, MIN_IN_CELL = 0.5, 3

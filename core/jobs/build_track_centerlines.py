@@ -19,7 +19,7 @@ def _check(values: Values) -> None:
 
 def _run(values: Values, progress: Progress) -> Result:
     """Pair the rails of each class."""
-    from ..checks.lines import with_tracks
+    from ..checks.warnings import with_tracks
     from ..files.layers import lines_layer
     from ..tracks.centerlines import tracks_of
 

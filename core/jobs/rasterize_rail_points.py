@@ -18,7 +18,7 @@ def _check(values: Values) -> None:
 
 def _run(values: Values, progress: Progress) -> Result:
     """Rasterize each class."""
-    from ..checks.points import plausible
+    from ..checks.warnings import plausible
     from ..clouds.on_heads import heads_of
     from ..clouds.points import read_requested
     from ..files.rail_rasters import header_for

@@ -31,7 +31,7 @@ def _check(values: Values) -> None:
 
 def _run(values: Values, progress: Progress) -> Result:
     """Vectorize each class."""
-    from ..checks.lines import warn_of_rails
+    from ..checks.warnings import warn_of_rails
     from ..files.layers import lines_layer
     from ..squares.steps import lines_of
     from .clouds import Area, read_points_in

@@ -12,8 +12,8 @@ from pathlib import Path
 
 from .. import checks
 from ..checks.doubts import doubting_scatter
-from ..checks.points import plausible
 from ..checks.standard import warn_of_spacing
+from ..checks.warnings import plausible
 from ..clouds.points import RailPoints
 from ..errors import NoRailPointsError, NoTrackError
 from ..heads.strips import strip_courses

@@ -1,21 +1,23 @@
 """Warnings: of points, before anything is computed, and of lines that do not look like rails."""
 
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from built import rail_of, source_of
+from built import centerline_of, rail_of, rails_of, source_of
 from heard import Heard
 from rail_extract.core.checks.warnings import (
+    displacement,
     plausible,
     warn_of_airborne,
+    warn_of_blunt_lines,
+    warn_of_rails,
     warn_of_unexplained,
+    with_tracks,
 )
 from rail_extract.core.errors import CloudError
-from rail_extract.core.tiles.grid import MIN_IN_WINDOW, WINDOW_M, lay_out, occupied_squares
-from dataclasses import replace
-from built import centerline_of, rails_of
-from rail_extract.core.checks.warnings import displacement, warn_of_blunt_lines, warn_of_rails, with_tracks
 from rail_extract.core.parameters import Parameters
+from rail_extract.core.tiles.grid import MIN_IN_WINDOW, WINDOW_M, lay_out, occupied_squares
 from rail_extract.laboratory.curves import Element, trace
 
 RNG = np.random.default_rng(4)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from built import cloud_of, rails_of, source_of
 from heard import Heard
-from rail_extract.core.checks.lines import warn_of_split_classes
+from rail_extract.core.checks.warnings import warn_of_split_classes
 from rail_extract.core.errors import Cancelled, ParameterError
 from rail_extract.core.pipeline import Parameters, drawing, extract_files, extract_rails
 from rail_extract.core.polyline import length_along, project
