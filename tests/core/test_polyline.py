@@ -4,6 +4,7 @@ import pickle
 
 import numpy as np
 import pytest
+from built import arc
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rail_extract.core.polyline import Chords, Polyline, project
@@ -18,11 +19,6 @@ def winding(seed, columns=2, count=40):
     heading = np.cumsum(random.uniform(-0.1, 0.1, count))
     steps = random.uniform(0.5, 3, count)[:, None] * np.column_stack([np.cos(heading), np.sin(heading)])
     return np.column_stack([np.cumsum(steps, axis=0), random.uniform(0, 5, (count, columns - 2))])
-
-
-def arc(radius, length, count=400):
-    angle = np.linspace(0, length / radius, count)
-    return radius * np.column_stack([np.sin(angle), 1 - np.cos(angle)])
 
 
 @given(SEEDS, st.floats(0.3, 20), st.floats(0.01, 3))

@@ -8,9 +8,16 @@ from rail_extract.core.frame import LocalFrame
 from rail_extract.core.lines.network import LineNetwork
 from rail_extract.core.rails import Centerline, RailLine, Support, TrackGeometry
 from rail_extract.core.tiles.grid import MemorySource
+from rail_extract.laboratory.scenes.raw_shapes import flat, rough, with_track
 
 ORIGIN = LocalFrame(np.zeros(3))
 IN_FEET = LocalFrame(np.array([387_600.0, 1_430_200.0, 500.0]), 0.3048, 0.3048)
+
+
+def arc(radius_m, length_m, step_m=0.1):
+    """Places on an arc to the left from the origin, eastward, (n, 2)."""
+    angle = np.linspace(0.0, length_m / radius_m, round(length_m / step_m) + 1)
+    return radius_m * np.column_stack([np.sin(angle), 1 - np.cos(angle)])
 
 
 def rail_of(line, rail_id=1, **fields):
@@ -83,6 +90,13 @@ def cloud_of(*parts, code=10, **fields):
 def source_of(*parts, code=10, side_m=500.0):
     """The same, to be read square by square."""
     return MemorySource(cloud_of(*parts, code=code), side_m)
+
+
+def raw_track(size_m, per_m2, seed=3, angle=0.3):
+    """Points of a square of raw cloud with a track on ballast, (n, 3), and which are on heads."""
+    rng = np.random.RandomState(seed)
+    xyz, on = with_track(flat(size_m, rng=rng, per_m2=per_m2), 1.435, 0.072, angle)
+    return rough(xyz, rng), on
 
 
 def rms(values):

@@ -2,18 +2,14 @@
 
 import numpy as np
 import pytest
+from built import arc
 from hypothesis import given
 from hypothesis import strategies as st
 from rail_extract.core.airborne.guide_line import axis_of_guide
 
 
-def arc(radius_m, step_m, length_m=400.0):
-    angle = np.arange(0.0, length_m + 1, step_m) / radius_m
-    return radius_m * np.column_stack([np.sin(angle), 1 - np.cos(angle)])
-
-
 def test_the_error_of_chords_is_removed():
-    axis = axis_of_guide(arc(300.0, 40.0))
+    axis = axis_of_guide(arc(300.0, 400.0, 40.0))
     off = np.hypot(*(axis.xy - [0.0, 300.0]).T) - 300.0
     inner = (axis.t > 60) & (axis.t < 340)
     assert np.abs(off[inner]).max() < 0.12  # the sagitta of a chord is 0.67 m

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from built import centerline_of, rail_of, rails_of, source_of
+from built import arc, centerline_of, rail_of, rails_of, source_of
 from heard import Heard
 from rail_extract.core.checks.warnings import (
     displacement,
@@ -176,11 +176,6 @@ def test_a_rail_of_two_tracks_states_both():
     assert [one.track_ids for one in kept] == [(1, 2), (1,), (2,)]
 
 
-def arc(radius_m, length_m=40.0):
-    angle = np.linspace(0, length_m / radius_m, 400)
-    return radius_m * np.column_stack([np.sin(angle), 1 - np.cos(angle)])
-
-
 def warned(line, smoothing_m):
     heard = Heard()
     warn_of_rails(rails_of(line), 10, Parameters(1.435, 0.072, smoothing_xy_m=smoothing_m), heard)
@@ -189,7 +184,7 @@ def warned(line, smoothing_m):
 
 @pytest.mark.parametrize(("radius_m", "sigma_m"), [(25, 1.0), (60, 2.0), (300, 3.0)])
 def test_a_line_that_ends_in_an_arc_is_displaced_in_proportion_to_sigma_squared(radius_m, sigma_m):
-    assert displacement(arc(radius_m), sigma_m) == pytest.approx(0.26 * sigma_m**2 / radius_m, rel=0.03)
+    assert displacement(arc(radius_m, 40.0), sigma_m) == pytest.approx(0.26 * sigma_m**2 / radius_m, rel=0.03)
 
 
 def test_a_ring_has_no_end():
@@ -197,11 +192,11 @@ def test_a_ring_has_no_end():
 
 
 def test_three_metres_are_too_much_in_a_tram_curve():
-    assert warned(arc(25.0), 3.0) == [
+    assert warned(arc(25.0, 40.0), 3.0) == [
         "SMOOTHING_XY of 3 m displaces lines in curves by up to 98 mm, more than points can correct: "
         "set it to 1.8 m or less."
     ]
-    assert warned(arc(25.0), 1.8) == []
+    assert warned(arc(25.0, 40.0), 1.8) == []
 
 
 def test_three_metres_do_no_harm_on_a_main_line():

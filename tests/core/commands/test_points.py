@@ -6,6 +6,7 @@ import laspy
 import numpy as np
 import pyproj
 import pytest
+from built import raw_track
 from rail_extract.__main__ import main
 from rail_extract.core.clouds.points import ask
 from rail_extract.core.pipeline import Parameters, extract_files
@@ -30,12 +31,6 @@ def save(tmp_path):
     return save
 
 
-def scene(size=10.0):
-    rng = np.random.RandomState(3)
-    xyz, on = with_track(flat(size, rng=rng, per_m2=2500), 1.435, 0.072, 0.3)
-    return rough(xyz, rng), on
-
-
 def test_too_little_memory_is_one_sentence(tmp_path, monkeypatch, capsys):
     """Also where lazrs finds none for its threads."""
     for error in (MemoryError("Unable to allocate 9 GiB"), Exception("ThreadPoolBuildError { kind: IOError }")):
@@ -50,7 +45,7 @@ def test_too_little_memory_is_one_sentence(tmp_path, monkeypatch, capsys):
 
 
 def test_a_classified_copy_is_written(save, tmp_path, capsys):
-    xyz, on = scene()
+    xyz, on = raw_track(10.0, 2500)
     new = tmp_path / "out" / "new.las"
     assert main(["classify", str(save(xyz)), "--output", str(new), "--rail-class", "20"]) == 0
     found = laspy.read(new).classification == 20
@@ -62,7 +57,7 @@ def test_a_classified_copy_is_written(save, tmp_path, capsys):
 def test_workers_change_nothing(save, tmp_path, monkeypatch):
     """However small the cloud is."""
     monkeypatch.setattr(processes, "WORTH_S", 0.0)
-    source = str(save(scene()[0]))
+    source = str(save(raw_track(10.0, 2500)[0]))
     for count in ("1", "2"):
         assert main(["classify", source, "--output", str(tmp_path / f"{count}.las"), "--workers", count]) == 0
     assert (tmp_path / "1.las").read_bytes() == (tmp_path / "2.las").read_bytes()
@@ -76,7 +71,7 @@ def test_a_raw_cloud_with_few_points_is_doubted(save, tmp_path):
 
 
 def test_points_of_a_raw_cloud_that_give_no_rail_are_not_blamed_on_the_classes(save, tmp_path):
-    request = ask([save(scene()[0])], SEARCHED_CLASSES)
+    request = ask([save(raw_track(10.0, 2500)[0])], SEARCHED_CLASSES)
     parameters = Parameters(1.435, 0.072, engine="OPENCV", min_length_m=1000.0)
     network = extract_files(Raw(request), tmp_path, parameters, Runner())
     assert network.search.points and not network.rails
@@ -85,7 +80,7 @@ def test_points_of_a_raw_cloud_that_give_no_rail_are_not_blamed_on_the_classes(s
 
 
 def along_track(left=0.0, angle=0.3, length=60.0):
-    """A line along the track of `scene`, or turned from it, in UTM zone 32 N."""
+    """A line along the track of `raw_track`, or turned from it, in UTM zone 32 N."""
     direction, across = np.array([np.cos(angle), np.sin(angle)]), np.array([-np.sin(angle), np.cos(angle)])
     return MIDDLE + left * across + np.outer([-length, length], direction) + CORNER[:2]
 
@@ -105,7 +100,7 @@ def test_only_the_track_along_the_guide_is_classified(save, tmp_path, capsys, le
     guide = geojson(tmp_path / "guide.json", along_track(left))
     new = tmp_path / "new.las"
     options = ["--guide", guide, "--only-guided", "--crs", "EPSG:32632"]
-    assert main(["classify", str(save(scene()[0])), "--output", str(new), *options]) == 0
+    assert main(["classify", str(save(raw_track(10.0, 2500)[0])), "--output", str(new), *options]) == 0
     assert (laspy.read(new).classification == 10).any() == found
     assert ("No track has the guide within 0.5 m of its middle" in capsys.readouterr().err) == (not found)
 
@@ -124,7 +119,7 @@ def test_each_mistake_of_a_search_gets_a_sentence(save, tmp_path, capsys, monkey
     geojson(tmp_path / "far.json", along_track(50.0))
     (tmp_path / "empty.json").write_text('{"type": "FeatureCollection", "features": []}')
     options = ["--output", str(tmp_path / "new.las"), "--crs", "EPSG:32632", *options]
-    assert main(["classify", str(save(scene()[0])), *options]) == 1
+    assert main(["classify", str(save(raw_track(10.0, 2500)[0])), *options]) == 1
     assert message in capsys.readouterr().err
     assert not (tmp_path / "new.las").exists()
 

@@ -2,19 +2,18 @@
 
 import numpy as np
 import pytest
+from built import raw_track
 from rail_extract.core.learned import blocks
 from rail_extract.core.learned.blocks import MAX_POINTS, RAIL_VOXEL_M, core_side, cut, thin
-from rail_extract.laboratory.scenes.raw_shapes import TOP_M, flat, rough, with_track
+from rail_extract.laboratory.scenes.raw_shapes import TOP_M
 
-GAUGE, WIDTH, SIDE = 1.435, 0.072, 41.0
+SIDE = 41.0
 
 
 @pytest.fixture(scope="module")
 def track():
     """Points of 9 m of track, and which are on heads."""
-    rng = np.random.RandomState(3)
-    xyz, on = with_track(flat(9.0, rng=rng, per_m2=2000), GAUGE, WIDTH, 0.3)
-    return rough(xyz, rng), on
+    return raw_track(9.0, 2000)
 
 
 @pytest.fixture(scope="module")

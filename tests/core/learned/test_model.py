@@ -4,13 +4,13 @@ import sys
 
 import numpy as np
 import pytest
+from built import raw_track
 from rail_extract.core.errors import ModelError
 from rail_extract.core.learned import model
 from rail_extract.core.learned.blocks import cut, thin
 from rail_extract.core.progress import Progress, Recording
 from rail_extract.laboratory.ruler.classification import score
 from rail_extract.laboratory.scenes.raw_catalogue import AIR
-from rail_extract.laboratory.scenes.raw_shapes import flat, rough, with_track
 
 
 def test_without_pytorch_one_sentence_says_what_to_install(monkeypatch, tmp_path):
@@ -43,9 +43,7 @@ def test_weights_survive_the_file(network, tmp_path):
 
 
 def track():
-    rng = np.random.RandomState(3)
-    xyz, _ = with_track(flat(6.0, rng=rng, per_m2=1000), 1.435, 0.072, 0.3)
-    thinned = thin(rough(xyz, rng))
+    thinned = thin(raw_track(6.0, 1000)[0])
     return thinned, cut(thinned, 41.0)
 
 

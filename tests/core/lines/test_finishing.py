@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from built import rail_of
+from built import arc, rail_of
 from heard import Heard
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -83,12 +83,7 @@ def way(*corners, step_m=0.1):
     return interpolate(corners, along, np.arange(0, along[-1] + step_m / 2, step_m))
 
 
-def bend(radius_m, length_m=15.0):
-    t = np.arange(0, length_m, 0.1) / radius_m
-    return radius_m * np.column_stack([np.sin(t), 1 - np.cos(t)])
-
-
-@pytest.mark.parametrize("line", [way([0, 0], [30, 0]), way([0, 0], [0.4, 0]), bend(20.0), bend(-8.0)])
+@pytest.mark.parametrize("line", [way([0, 0], [30, 0]), way([0, 0], [0.4, 0]), arc(20.0, 15.0), arc(-8.0, 15.0)])
 def test_what_a_rail_can_do_stays(line):
     assert parts_without_turns(line, 1.0, 0.1) == [(0.0, pytest.approx(length_along(line)[-1]))]
 
@@ -153,13 +148,8 @@ def test_no_line_of_a_damaged_network_turns_as_no_rail_can(seed):
     assert all(len(parts_without_turns(rail.xyz[:, :2], 0.0, 0.1, MAX_TURN_DEG + 1.5)) == 1 for rail in rails)
 
 
-def arc(radius, length, step=0.05):
-    angle = np.arange(0, length / radius, step / radius)
-    return radius * np.column_stack([np.sin(angle), 1 - np.cos(angle), 0 * angle])
-
-
 def test_lines_keep_the_vertices_in_which_others_end():
-    main = arc(300.0, 60.0)
+    main = rail_of(arc(300.0, 60.0, 0.05)).xyz
     branch = main[517] + np.column_stack([np.arange(20.0), 0.02 * np.arange(20.0) ** 2, np.zeros(20)])
     alone = thin([rail_of(main)], 0.002, 0.002)[0].xyz
     thinned, other = (line.xyz for line in thin([rail_of(main), rail_of(branch)], 0.002, 0.002))
@@ -208,6 +198,6 @@ def test_height_counts_on_its_own_and_plan_without_height():
 
 
 def test_a_tolerance_of_zero_drops_only_vertices_on_the_line():
-    assert essential_vertices(arc(25, 90.0, step=3.0), 0.0, 0.0).all()
+    assert essential_vertices(rail_of(arc(25, 90.0, 3.0)).xyz, 0.0, 0.0).all()
     straight = np.column_stack([np.arange(9.0), np.zeros(9), np.zeros(9)])
     assert essential_vertices(straight, 0.0, 0.0).sum() == 2

@@ -5,7 +5,7 @@ import re
 import laspy
 import numpy as np
 import pytest
-from rail_extract.laboratory.scenes.raw_shapes import flat, rough, with_track
+from built import raw_track
 
 CORNER = np.array([500_000.0, 3_000_000.0, 100.0])
 
@@ -13,9 +13,7 @@ CORNER = np.array([500_000.0, 3_000_000.0, 100.0])
 @pytest.fixture
 def raw(write_cloud):
     """Write 10 m of track on ballast as class 2."""
-    rng = np.random.RandomState(3)
-    xyz, _ = with_track(flat(10.0, rng=rng, per_m2=2500), 1.435, 0.072, 0.3)
-    return write_cloud(rough(xyz, rng) + CORNER, "raw.laz", 2)
+    return write_cloud(raw_track(10.0, 2500)[0] + CORNER, "raw.laz", 2)
 
 
 def test_only_rail_points_of_part_of_the_cloud_go_into_a_temporary_file(raw, run_step):
