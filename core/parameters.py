@@ -166,17 +166,9 @@ class GrowParameters:
 class FitParameters:
     """How design elements are fitted to tracks; lengths in metres.
 
-    Attributes
-    ----------
-    tolerance_m : float
-        How far the track may be off its design: the largest standard deviation of misalignment that is told from
-        design.
-    min_length_m : float
-        Least length of an element.
-    transitions : str
-        One of `TRANSITIONS`.
-    rounded : bool
-        Whether round radii are proposed.
+    `tolerance_m` is how far the track may be off its design: the largest standard deviation of misalignment that is
+    told from design. `min_length_m` is the least length of an element, `transitions` one of `TRANSITIONS`, and
+    `rounded` says whether round radii are proposed.
     """
 
     tolerance_m: float = 0.005
@@ -189,16 +181,9 @@ class FitParameters:
 class AirborneParameters:
     """What the search for tracks in airborne clouds can be told; lengths in metres.
 
-    Attributes
-    ----------
-    gauge_m, head_width_m : float
-        See `Parameters`; a guide may state its own gauge.
-    reach_m : float
-        Largest distance of a track from its guide.
-    footprint_m : float
-        Diameter of the laser beam on the ground.
-    rail_height_m : float
-        Top of the rails above the bed between them.
+    Gauge and head are as in `Parameters`; a guide may state its own gauge. `reach_m` is the largest distance of a track
+    from its guide, `footprint_m` the diameter of the laser beam on the ground, and `rail_height_m` that of the tops of
+    the rails above the bed between them.
     """
 
     gauge_m: float
@@ -216,15 +201,9 @@ class AirborneParameters:
 class ComparisonParameters:
     """How the lines of two surveys are compared.
 
-    Attributes
-    ----------
-    reach_m : float
-        Largest distance at which two lines are the same: more than a track moves between two surveys, and less than
-        that of the rails of the narrowest gauge.
-    step_m : float
-        Distance between stations.
-    ignore_shift : bool
-        Whether a constant shift does not count as a movement.
+    `reach_m` is the largest distance at which two lines are the same: more than a track moves between two surveys, and
+    less than that of the rails of the narrowest gauge. `step_m` is the distance between stations. With `ignore_shift`,
+    a constant shift does not count as a movement.
     """
 
     reach_m: float = 0.5

@@ -75,16 +75,9 @@ NO_LINES = Lines(np.empty((0, 2)), np.empty(0), np.empty(0), np.empty(0), np.emp
 
 @dataclass(frozen=True)
 class Flush:
-    """Rails in pavement.
+    """Rails in pavement: the numbers of the `points` on heads, (k,), and the `lines` along these.
 
-    Attributes
-    ----------
-    points : (k,) int array
-        Numbers of the points on heads.
-    lines : Lines
-        Axes of the heads.
-    rails : Lines
-        Those that the guide leaves out as well.
+    `rails` are those that the guide leaves out as well.
     """
 
     points: np.ndarray
@@ -154,14 +147,7 @@ def _pavement(shape: tuple[int, int], points: NearBed) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Heads:
-    """Lines along heads, or along the grooves inside them.
-
-    Attributes
-    ----------
-    lines : Lines
-    inward : (n, 2) array
-        Unit vectors across, towards the other rail.
-    """
+    """Lines along heads, or along the grooves inside them; `inward`, (n, 2), has unit vectors to the other rail."""
 
     lines: Lines
     inward: np.ndarray
@@ -188,18 +174,10 @@ def _grooves(lines: Lines, gauge_m: float) -> Heads:
 
 
 def _at_edge(grooves: Heads, xy: np.ndarray, head_width_m: float) -> Heads:
-    """Put the axes of the heads beside the outer edges of the grooves.
+    """Put the axes of the heads beside the outer edges of the grooves, given level points, (k, 2).
 
     The groove is a gap in what is level. A scanner to one side sees one wall only, and the middle of what it sees in
     the groove is not the groove's; but the gap begins where the head ends.
-
-    Parameters
-    ----------
-    grooves : Heads
-        Lines through what is seen in the grooves.
-    xy : (k, 2) array
-        Level points.
-    head_width_m : float
     """
     if not len(grooves.inward) or not len(xy):
         return grooves.of(np.zeros(len(grooves.inward), dtype=bool))

@@ -34,17 +34,9 @@ WIDEST_M = 0.075
 
 
 def whole_heads(tops: Tops, kept: np.ndarray, tolerances: Tolerances) -> np.ndarray:
-    """Spread kept cells over the other cells of their blocks of 2 x 2, and drop feet and fastenings.
+    """Spread kept cells, one of each block of 2 x 2, over the others of their blocks, and drop feet and fastenings.
 
-    Parameters
-    ----------
-    kept : (k,) int array
-        One cell of each block.
-
-    Returns
-    -------
-    (m,) int array
-        Cells in rising order.
+    Returns the cells in rising order, (m,).
     """
     rows, columns = tops.grid.shape
     row, column = np.divmod(kept, columns)
@@ -79,14 +71,9 @@ def _highest_around(image: np.ndarray, cells: np.ndarray, reach: float) -> np.nd
 
 
 def label(tops: Tops, heads: np.ndarray, cell: np.ndarray, height: np.ndarray, tolerances: Tolerances) -> np.ndarray:
-    """Find the points in the height of railheads on their cells and the neighbouring ones, (k,) int numbers.
+    """Find the points in the height of railheads on cells, (m,), and the neighbouring ones, (k,) int numbers.
 
-    Parameters
-    ----------
-    heads : (m,) int array
-        Cells of railheads.
-    cell, height : (n,) arrays
-        Cell of each point and its height above the bed.
+    Given are the cell of each point and its height above the bed, (n,).
     """
     if not len(heads):
         return np.empty(0, dtype=np.int64)
@@ -110,16 +97,10 @@ def _mean_tops(window: Window, tops: Tops, image: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Near:
-    """Places and the cells nearest to them.
+    """A `count` of places, and the cells nearest to them.
 
-    Attributes
-    ----------
-    count : int
-        Number of places.
-    place, cell : (m,) int arrays
-        Pairs; the nearest cell of each place comes first.
-    across : (m,) array
-        How far the place is across from the axis of the cell, metres.
+    `place` and `cell`, (m,), are pairs, of which the nearest cell of each place comes first; `across`, (m,) metres, is
+    how far the place is across from the axis of the cell.
     """
 
     count: int

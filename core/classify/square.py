@@ -68,15 +68,7 @@ a guard rail, the axis would lie between both rails."""
 
 @dataclass(frozen=True)
 class Shown:
-    """What a square shows near its bed.
-
-    Attributes
-    ----------
-    xy, cell, height : (n, 2), (n,) and (n,) arrays
-        Points: places, cells and heights above the bed.
-    bed : Bed
-    tops : Tops
-    """
+    """What a square shows near its bed: places, (n, 2), of points, their cells and heights above the bed, (n,)."""
 
     xy: np.ndarray
     cell: np.ndarray
@@ -87,17 +79,10 @@ class Shown:
 
 @dataclass(frozen=True)
 class Candidates:
-    """Cells that may be on railheads.
+    """Cells that may be on railheads: those with narrow tops, (n,).
 
-    Attributes
-    ----------
-    tops : Tops
-    cells : (n,) int array
-        Narrow tops.
-    marks : (m,) int array
-        The highest one of each block of 2 x 2 cells.
-    places : (rows * columns, 2) array
-        Middles of the tops of these cells.
+    `marks`, (m,), has the highest one of each block of 2 x 2 cells, and `places`, (rows * columns, 2), the middles of
+    the tops of all cells.
     """
 
     tops: Tops
@@ -119,17 +104,9 @@ class Candidates:
 
 @dataclass(frozen=True)
 class Kept:
-    """Cells of railheads, one of each block of 2 x 2.
+    """Cells of railheads, one of each block of 2 x 2: their numbers in the grid, (n,).
 
-    Attributes
-    ----------
-    lines : Lines
-    cell : (n,) int array
-        Their numbers in the grid.
-    paired : (n,) bool array
-        Cells with a partner.
-    pairs : (m, 2) int array
-        Cells that continue each other.
+    `paired`, (n,) bool, says which have a partner, and `pairs`, (m, 2), which continue each other.
     """
 
     lines: Lines
@@ -146,14 +123,7 @@ class Kept:
 
 @dataclass(frozen=True)
 class Classified:
-    """The answer for one square.
-
-    Attributes
-    ----------
-    rail : (n,) bool array
-        Points on railheads; False for those in the margin.
-    figures : SearchFigures
-    """
+    """The answer for one square: which points are on railheads, (n,) bool; those in the margin are not."""
 
     rail: np.ndarray
     figures: SearchFigures
@@ -163,10 +133,7 @@ class Classified:
 class ByShape(Classified):
     """The answer of geometry for one square.
 
-    Attributes
-    ----------
-    flush : Classified
-        What of it is in pavements; its figures leave out points and squares.
+    `flush` is what of it is in pavements; its figures leave out points and squares.
     """
 
     flush: Classified
@@ -175,12 +142,8 @@ class ByShape(Classified):
 def classify_square(xyz: np.ndarray, settings: Settings) -> ByShape:
     """Find the points on railheads in a square.
 
-    Parameters
-    ----------
-    xyz : (n, 3) array
-        Metres from the square's south-western corner: all points of the square and those in a margin of `MARGIN_M`.
-        The corner lies at a multiple of `Settings.side_m` from the zero of the coordinate system.
-    settings : Settings
+    All points of the square and those in a margin of `MARGIN_M` are given, (n, 3) metres from its south-western corner,
+    which lies at a multiple of `Settings.side_m` from the zero of the coordinate system.
     """
     rail = np.zeros(len(xyz), dtype=bool)
     nothing = ByShape(rail, SearchFigures(), Classified(rail, SearchFigures()))
@@ -410,13 +373,7 @@ def _certain(lines: Lines, paired: np.ndarray, pairs: np.ndarray) -> np.ndarray:
 
 
 def _completed(found: Candidates, kept: Kept, settings: Settings, tolerances: Tolerances) -> np.ndarray:
-    """Add to the kept cells the other candidates on their axes: the line that such a cell saw was a wrong one.
-
-    Returns
-    -------
-    (k,) int array
-        Cells.
-    """
+    """Add to the kept cells the other candidates on their axes: the line that such a cell saw was a wrong one."""
     others = np.setdiff1d(found.marks, kept.cell)
     return np.union1d(kept.cell, others[_near_axes(found.at(others), kept, settings, tolerances.along_m)])
 

@@ -123,17 +123,10 @@ class StripOffsets:
         return np.where(self.count >= 2, np.maximum(*spans), np.nan)
 
     def standard_error(self, offsets: np.ndarray, align: bool) -> np.ndarray:
-        """Return the standard error of a line that several strips show, (n,) metres.
+        """Return the standard error of a line that several strips show, (n,) metres; offsets are `across` or `up`.
 
         The mean of strips errs as their differences show; a line that follows some of them more than others errs by its
         distance from the mean as well. Away from the place where strips meet, their errors there are the best estimate.
-
-        Parameters
-        ----------
-        offsets : (s, n) array
-            `across` or `up`.
-        align : bool
-            See `moved`.
         """
         count, meeting = self.count, self.count >= 2
         if not meeting.any():
@@ -207,12 +200,8 @@ def _steps(length_m: float) -> int:
 class _Shown:
     """How one strip shows a line, at n stations `STEP_M` apart.
 
-    Attributes
-    ----------
-    across, up : (n,) arrays
-        Offset of the middle of the head to the left of the line, and height of its top; NaN where it shows none.
-    points : (n,) array
-        Number of points on top.
+    `across` and `up`, (n,), are the offset of the middle of the head to the left of the line and the height of its top;
+    NaN where it shows none. `points`, (n,), are those on top.
     """
 
     across: np.ndarray
@@ -263,22 +252,12 @@ def _third_differences(line: np.ndarray, t: np.ndarray) -> np.ndarray:
 
 
 def _from_mean(observed: np.ndarray, third: np.ndarray) -> np.ndarray:
-    """Separate what strips show of a rail into the rail and the offset of each strip.
+    """Separate what strips show of a rail into the rail and the offset of each strip, (s, n).
 
     The rail bends as smoothly as rails do, and the offset of a strip changes slowly. Least squares give both, so that
-    strips that show the same places, and strips that meet, are treated alike.
-
-    Parameters
-    ----------
-    observed : (s, n) array
-        Position of the rail at n stations as each strip shows it, relative to a line; NaN where it does not.
-    third : (n - 3,) array
-        Third differences of that line.
-
-    Returns
-    -------
-    (s, n) array
-        Offsets of the strips.
+    strips that show the same places, and strips that meet, are treated alike. Given are the position of the rail
+    relative to a line at n stations as each strip shows it, (s, n), NaN where it does not, and the third differences of
+    that line, (n - 3,).
     """
     count, n = observed.shape
     base = float(np.nanmedian(observed))
@@ -321,18 +300,10 @@ def _prior(count: int, n: int, third: np.ndarray) -> tuple[sparse.csr_matrix, np
 
 
 def rows_of(lines: Sequence[np.ndarray], offsets: Sequence[StripOffsets | None]) -> np.ndarray:
-    """List the offsets of strips where they meet.
+    """List the offsets of strips where they meet, given lines, (n, 2) each, and the offsets along each.
 
-    Parameters
-    ----------
-    lines : sequence of (n, 2) arrays
-    offsets : sequence of StripOffsets or None
-        For each of them.
-
-    Returns
-    -------
-    (k, 7) array
-        x and y of a station, number of a strip that shows it, its offset in x, y and z, and the number of points.
+    Rows, (k, 7), have x and y of a station, the number of a strip that shows it, its offset in x, y and z, and the
+    number of points.
     """
     rows = [np.empty((0, 7))]
     for line, own in zip(lines, offsets):
