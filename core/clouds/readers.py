@@ -78,34 +78,16 @@ def read_classes(
     extent: Extent | np.ndarray | None = None,
     leave_out: Sequence[str] = (),
 ) -> Iterator[Chunk]:
-    """Read a file chunk by chunk and keep the points of some classes; withheld points are left out.
+    """Read a file chunk by chunk and keep the points of some classes, 0 to 255; withheld points are left out.
 
-    Parameters
-    ----------
-    class_codes : sequence of int
-        Classes to keep, 0 to 255.
-    extent : tuple of float or (k, 4) array, optional
-        Where points are needed, one rectangle or several: those elsewhere may be left out where that saves time, as in
-        COPC files.
-    leave_out : sequence of str
-        Some of `parameters.LEAVE_OUT`: points with these flags are treated like withheld ones.
+    `extent` is where points are needed, a rectangle or several, (k, 4): those elsewhere may be left out if that saves
+    time, as in COPC files. Points with the flags in `leave_out`, some of `parameters.LEAVE_OUT`, are treated like
+    withheld ones.
 
-    Yields
-    ------
-    xyz : (n, 3) array
-        Points kept from a chunk, in units of the CRS.
-    codes : (n,) uint8 array
-        Their classes.
-    marks : (n,) uint32 array
-        What tells their passes apart, see `passes.marks_of`. All 0 where the file states neither source ids nor times.
-    census : (256,) int array
-        Points in the chunk by class, kept or not, without withheld ones. Of a file that is not read as a whole, only
-        those of the classes to keep.
-
-    Raises
-    ------
-    CloudError
-        The file has an unknown suffix, or turns out to be cut off or damaged.
+    Of each chunk it yields the points kept, (n, 3) in units of the CRS, their classes, (n,), their marks, (n,), see
+    `passes.marks_of`, all 0 where the file states neither source ids nor times, and the number of its points by class,
+    (256,), kept or not, without withheld ones; of a file that is not read as a whole, only those of the classes to
+    keep. Raises CloudError if the file has an unknown suffix, or turns out to be cut off or damaged.
     """
     wanted = np.zeros(256, dtype=bool)
     wanted[list(class_codes)] = True

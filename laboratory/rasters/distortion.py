@@ -50,17 +50,10 @@ FASTENING_LENGTH_M = 0.15
 
 @dataclass(frozen=True)
 class Pair:
-    """A corrupted raster, the ideal one, and what was done to it.
+    """A corrupted raster, the ideal one, and what was done to it; (size, size) arrays.
 
-    Attributes
-    ----------
-    observed, label : (size, size) bool arrays
-    distractor : (size, size) bool array
-        Cells of the observed raster that guard rails and lone lines set, without those of the label.
-    gap : (size, size) int array
-        Number of the gap of each cell of the label that is in a gap, from 1; 0 elsewhere.
-    gap_lengths_m : tuple of float
-        Length of each gap.
+    `distractor` has the cells of the observed raster that guard rails and lone lines set, without those of the label,
+    and `gap` the number of the gap of each cell of the label that is in one, from 1; 0 elsewhere.
     """
 
     observed: np.ndarray

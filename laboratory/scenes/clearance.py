@@ -35,12 +35,7 @@ VERTEX_M = 0.5
 class Way:
     """A track with exact position, cant and gradient; `curve` is sampled finely.
 
-    Attributes
-    ----------
-    cant_m : callable
-        Cant at chainages: left rail top minus right rail top.
-    grade : float
-        Uphill, constant.
+    `cant_m` returns the cant at chainages, left rail top minus right rail top; the `grade`, uphill, is constant.
     """
 
     curve: Curve
@@ -87,15 +82,7 @@ class Way:
 
 @dataclass
 class Scene:
-    """Points of a scene with the truth about it.
-
-    Attributes
-    ----------
-    ways : list of Way
-        The first one carries all things.
-    xyz, code : list of arrays
-    truth : list of Truth
-    """
+    """Points of a scene with the truth about it; the first of its `ways` carries all things."""
 
     ways: list[Way]
     per_m2: float

@@ -43,18 +43,9 @@ driver.start(scenarios.{scenario}, {folder!r})
 
 @dataclass
 class Session:
-    """What a scenario found.
+    """What a scenario found: results as it kept them, and the folder of the files that it wrote, and of its pictures.
 
-    Attributes
-    ----------
-    results : dict
-        As the scenario kept them.
-    folder : Path
-        Contains the files that it wrote, and its pictures.
-    code : int
-        How QGIS ended: 0, or the number of a signal below 0.
-    said : str
-        What QGIS wrote to the terminal.
+    `code` is how QGIS ended, 0 or the number of a signal below 0, and `said` what it wrote to the terminal.
     """
 
     results: dict[str, Any]

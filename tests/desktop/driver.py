@@ -31,15 +31,7 @@ Scenario = Callable[["Driver"], Iterator]
 
 
 class Driver:
-    """Takes the steps of a scenario and keeps what it finds.
-
-    Parameters
-    ----------
-    scenario : callable
-        Takes the driver and returns the steps.
-    folder : Path
-        For `results.json` and the pictures.
-    """
+    """Takes the steps of a scenario and keeps what it finds, in `results.json`, and pictures, in a folder."""
 
     def __init__(self, scenario: Scenario, folder: Path) -> None:
         self.folder = folder
