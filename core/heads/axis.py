@@ -12,7 +12,8 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d
 
 from ..rails import Support
-from .edges import EDGE_SIGMA_M, FLANK_TOP_SIGMA_M, VIEW_STATIONS, Flank, Ridge, edge_middles, find_flank
+from .edges import EDGE_SIGMA_M, VIEW_STATIONS, Ridge, edge_middles
+from .faces import FLANK_TOP_SIGMA_M, Flank, band_of, beside_faces, find_flank
 from .head_points import MIN_ON_HEAD, STATION_STEP_M, HeadPoints
 from .level import robust_sigma
 from .roads import MIN_WIDER_M, bands, hidden_edges
@@ -140,13 +141,13 @@ def _of_band(points: HeadPoints, left_m: float, sigma_m: float) -> Shown:
     """Return what points show that are all on one face, or on the axis; the axis is at `left_m` on average."""
     stations, across = points.stations, points.across
     count, mean_m = _means(points)
-    noise_m = robust_sigma(across - np.interp(points.t, stations[count > 0], mean_m[count > 0]))
+    noise_m = robust_sigma(across - band_of(points))
     offset_m, common_m = mean_m + left_m - np.median(across), np.full(len(stations), sigma_m)
     return Shown(stations, count, offset_m, count / noise_m**2, common_m, Middles.unknown(len(stations)))
 
 
 def _of_head(points: HeadPoints, unseen_m: float, by_outline: bool) -> Shown:
-    """Return what points show of a head: its outline, else its edges, else the mean of the points on top."""
+    """Return what points show of a head: its outline, its edges, one of its sides, or the mean of the points on top."""
     stations, top = points.stations, points[points.top[0]]
     on_head, mean_m = _means(top[top.within(0.5)])
     free = points.free & ~hidden_edges(points)
@@ -158,15 +159,17 @@ def _of_head(points: HeadPoints, unseen_m: float, by_outline: bool) -> Shown:
     if by_outline:
         outline = outline_middles(points, shown & one_head)
     outlined = np.isfinite(outline.offset)
-    which = [outlined, seen, on_head > 0]
+    wanted = ~outlined & ~seen & free.all(axis=0)
+    beside = beside_faces(points, wanted)
+    which = [outlined, seen, wanted & np.isfinite(beside.offset), on_head > 0]
     unsure_m = np.hypot(unseen_m, either_end_m)
     by_mean = np.full(len(stations), STATION_STEP_M / unseen_m**2)
     return Shown(
         stations,
         top.per_station(),
-        np.select(which, [outline.offset, edge_m, mean_m]),
-        np.select(which, [outline.information, edge_information, by_mean]),
-        np.select(which, [outline.common, EDGE_SIGMA_M, unsure_m]),
+        np.select(which, [outline.offset, edge_m, beside.offset, mean_m]),
+        np.select(which, [outline.information, edge_information, beside.information, by_mean]),
+        np.select(which, [outline.common, EDGE_SIGMA_M, beside.common, unsure_m]),
         outline,
     )
 

@@ -1,9 +1,7 @@
-"""Edges of the railhead and the middle between them, from histograms of points across the line; and heads without both.
+"""Edges of the railhead and the middle between them, from histograms of points across the line; and blunt heads.
 
-Edges are those of docs/method.md section 6.2. A polished crown may return nothing, and a low scanner sees none: the
-points then form a band as narrow as their noise, and as high as a face, half a head off the axis. Beams from the air
-and dense matching of photographs blur a head to a ridge, which is a parabola across; its crest is the axis. See
-docs/method.md sections 6.7 and 6.10.
+Edges are those of docs/method.md section 6.2. Beams from the air and dense matching of photographs blur a head to a
+ridge, which is a parabola across; its crest is the axis. See docs/method.md section 6.10.
 """
 
 from __future__ import annotations
@@ -13,9 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from .head_points import BLUR_BINS, HALF_HEAD_BINS, HALF_RANGE_BINS, MIN_ON_HEAD, HeadPoints
+from .head_points import BLUR_BINS, HALF_HEAD_BINS, HALF_RANGE_BINS, HeadPoints
 from .level import OFF_TOP_SIGMAS, SLOPE_ROUNDS, robust_sigma, rough_level
-from .outline import FACE_DEPTH_M, Grid, Outline, fit_section, log_likelihood
 
 MAX_SHIFT_BINS = 15
 """Largest shift of a line, about 3 cm: half a cell of the raster and a little noise."""
@@ -50,29 +47,6 @@ on the view. Seen from above a track, the left and the right corner differ by 1.
 
 EDGE_ROUNDS = 2
 """The first round finds out how the scanner sees the head, the second uses the edges that count."""
-
-MAX_BAND_SHARE, BAND_PERCENTILES = 0.4, (5.0, 95.0)
-"""Width of a band, in head widths and between these percentiles, that may be a face: noise of 8 mm makes it 26 mm."""
-
-MIN_HEIGHT_M = 0.012
-"""Height of such a band, between the same percentiles and beyond its width: a face is 22 mm high."""
-
-OFF_AXIS = 0.25
-"""Distance of the axis from the middle of a band, in head widths, from which the band is a face, wherever the fit
-began: half of what it is on a face."""
-
-TOP_ABOVE_M = 0.022
-"""Height of the top above the middle of a face and its corner."""
-
-MIN_GAIN = 6.0
-"""Gain of the log-likelihood from which a face is preferred to a crown, and one side to the other: odds of 400."""
-
-FLANK_SIGMA_M = 0.0012
-"""Standard error of the axis from one face: half of what head widths differ by, and a millimetre because the slope
-across of the head is not seen."""
-
-FLANK_TOP_SIGMA_M = 0.0012
-"""Standard error of the top from one face: where the face ends below depends on the rail and on the view."""
 
 REACH_HEADS = 1.0
 """Distance from the line, in head widths, within which the ridge is a parabola: a Gaussian of 7 cm is, to a tenth."""
@@ -223,59 +197,6 @@ class CrossSections:
 def _excess(density: np.ndarray) -> np.ndarray:
     """Return the relative excess of density at the other edge, (2, s)."""
     return density[::-1] / np.maximum(density, 1e-6) - 1
-
-
-@dataclass(frozen=True)
-class Flank:
-    """A head that shows one face: offset of the axis to the left of the line, and top above the level of the points.
-
-    `sigma_m` is the standard error of the axis; half a head where the points may be on either face, and the axis is
-    then stated to be on them.
-    """
-
-    left_m: float
-    top_m: float
-    sigma_m: float
-
-
-def find_flank(points: HeadPoints) -> Flank | None:
-    """Find the head of a line whose points are on one face; None if they are not."""
-    across, head_width_m = points.across, points.width_m
-    if len(across) < MIN_ON_HEAD:
-        return None
-    low, high = np.percentile(across, BAND_PERCENTILES)
-    if high - low > MAX_BAND_SHARE * head_width_m:
-        return None
-    up = points.z - rough_level(points.t, points.z)
-    bottom, top = np.percentile(up, BAND_PERCENTILES)
-    if top - bottom < high - low + MIN_HEIGHT_M or top - bottom > 2 * FACE_DEPTH_M:
-        return None
-    middle, half = float(np.median(across)), 0.5 * head_width_m
-    starts = ((middle, 0.0), (middle - half, TOP_ABOVE_M), (middle + half, TOP_ABOVE_M))
-    fits = np.array([_fitted_from(across, up, head_width_m, *start) for start in starts])
-    off_m = fits[:, 1] - middle
-    side = np.where(np.abs(off_m) > OFF_AXIS * head_width_m, np.sign(off_m), 0)
-    best = int(np.argmax(fits[:, 0]))
-    likely = fits[:, 0] > fits[best, 0] - MIN_GAIN
-    if (side[likely] == 0).any():
-        return None
-    left_m, top_m = fits[best, 1:].tolist()
-    if (side[likely] != side[best]).any():
-        return Flank(middle, top_m, half)
-    return Flank(left_m, top_m, float(np.hypot(FLANK_SIGMA_M, np.ptp(fits[likely, 1]))))
-
-
-def _fitted_from(
-    across: np.ndarray, up: np.ndarray, head_width_m: float, left_m: float, top_m: float
-) -> tuple[float, float, float]:
-    """Fit a head to points, from a place on: the logarithm of the likelihood, offset of the axis, height of the top."""
-    grid, outline = Grid.of(head_width_m), Outline.of(head_width_m)
-    bins = grid.number(across - left_m, up - top_m)
-    counts = np.bincount(bins[bins >= 0], minlength=grid.size).astype(float)
-    section = fit_section(counts, outline, grid)
-    strays = (len(up) - counts.sum()) * np.log(section.shares[-1] / grid.size)
-    likelihood = log_likelihood(counts, section, outline, grid) + strays
-    return likelihood, left_m + float(section.place[0]), top_m + float(section.place[1])
 
 
 @dataclass(frozen=True)

@@ -173,7 +173,7 @@ def outline_middles(points: HeadPoints, seen: np.ndarray) -> Middles:
     used = (bins >= 0) & seen[points.station]
     left, up, station, bins = left[used], up[used], points.station[used], bins[used]
     section: Section | None = None
-    for first, last in _borders(station, count):
+    for first, last in borders(station, count):
         here = slice(*np.searchsorted(station, [first, last]))
         counts = np.bincount(bins[here], minlength=grid.size).astype(float)
         if counts.sum() < MIN_SECTION_POINTS:
@@ -327,22 +327,22 @@ def _counted(points: HeadPoints, grid: Grid) -> Iterator[np.ndarray]:
     left, up, _ = points.in_frame()
     bins = grid.number(left, up)
     station = points.station[bins >= 0]
-    for first, last in _borders(station, len(points.stations)):
+    for first, last in borders(station, len(points.stations)):
         here = bins[bins >= 0][slice(*np.searchsorted(station, [first, last]))]
         counts = np.bincount(here, minlength=grid.size).astype(float)
         if counts.sum() >= MIN_SECTION_POINTS:
             yield counts
 
 
-def _borders(station: np.ndarray, count: int) -> list[tuple[int, int]]:
-    """Divide stations into sections of about VIEW_STATIONS, longer ones where points, at `station`, are few."""
+def borders(station: np.ndarray, count: int, least: int = MIN_SECTION_POINTS) -> list[tuple[int, int]]:
+    """Divide stations into sections of about VIEW_STATIONS, longer ones where points, at `station`, are fewer."""
     ends = np.linspace(0, count, max(int(round(count / VIEW_STATIONS)), 1) + 1).astype(int)
-    borders, before = [0], np.searchsorted(station, ends)
+    found, before = [0], np.searchsorted(station, ends)
     for end, points in zip(ends[1:].tolist(), before[1:].tolist()):
-        if points - np.searchsorted(station, borders[-1]) >= MIN_SECTION_POINTS:
-            borders.append(end)
-    borders[max(len(borders) - 1, 1) :] = [count]
-    return list(zip(borders[:-1], borders[1:]))
+        if points - np.searchsorted(station, found[-1]) >= least:
+            found.append(end)
+    found[max(len(found) - 1, 1) :] = [count]
+    return list(zip(found[:-1], found[1:]))
 
 
 def _pull(station: np.ndarray, is_left: np.ndarray, count: int) -> np.ndarray:

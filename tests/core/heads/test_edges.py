@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from rail_extract.core.heads.edges import Ridge, find_flank
+from rail_extract.core.heads.edges import Ridge
 from rail_extract.core.heads.head_points import HeadPoints, stations_along
 
 WIDTH, LENGTH_M, BEND = 0.072, 40.0, 8.0
@@ -27,26 +27,6 @@ def test_the_crest_is_found_within_its_standard_error(offset_m):
     assert abs(np.average(ridge.offset_m, weights=ridge.information) - offset_m) < 0.003
     of_stations = ((ridge.offset_m - offset_m) * np.sqrt(ridge.information))[20:-20]
     assert 0.5 < np.sqrt(np.mean(of_stations**2)) < 1.6
-
-
-@pytest.mark.parametrize("side", [-1, 1])
-@pytest.mark.parametrize("seed", [1, 7, 11])
-def test_a_face_with_much_of_its_corner_is_not_taken_for_a_crown(seed, side):
-    """The fit of a crown slides onto such a face: where fits agree, the side is certain."""
-    rng, count = np.random.default_rng(seed), 150
-    below, from_axis, turn = (
-        rng.uniform(0.013, 0.04, count),
-        np.full(count, WIDTH / 2),
-        rng.uniform(0.2, np.pi / 2, count),
-    )
-    corner = rng.random(count) < 0.6
-    from_axis[corner], below[corner] = 0.023 + 0.013 * np.sin(turn[corner]), 0.014 - 0.013 * np.cos(turn[corner])
-    t, noise_m = np.sort(rng.uniform(0, 22, count)), 0.002
-    across = side * (from_axis - WIDTH / 2 + rng.normal(0, noise_m, count))
-    line, free = np.array([[0.0, 0.0], [22.0, 0.0]]), np.ones((2, len(stations_along(22.0))), dtype=bool)
-    flank = find_flank(HeadPoints(t, across, -below + rng.normal(0, noise_m, count), WIDTH, line, free))
-    assert flank is not None
-    assert abs(flank.left_m + side * WIDTH / 2) < 0.006
 
 
 @pytest.mark.parametrize("count", [0, 1, 2, 3, 5, 12])

@@ -1,0 +1,230 @@
+"""Heads of which a scanner shows one side: where their axis is beside the band of points.
+
+A far scanner, or one beside a polished crown, sees one face and a little of the crown, half a head off the axis. Few
+points or many, offset and height together show which side of the head they are on. See docs/method.md section 6.7.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import median_filter
+
+from .head_points import MIN_ON_HEAD, HeadPoints
+from .level import MIN_NOISE_M, rough_level
+from .outline import FACE_DEPTH_M, VIEWS_DEG, Grid, Outline, fit_section, log_likelihood
+from .sections import MIN_SECTION_POINTS, borders
+
+MAX_BAND_SHARE, BAND_PERCENTILES = 0.4, (5.0, 95.0)
+"""Width of a band, in head widths and between these percentiles, that may be a face: noise of 8 mm makes it 26 mm."""
+
+MIN_HEIGHT_M = 0.012
+"""Height of such a band, between the same percentiles and beyond its width: a face is 22 mm high."""
+
+OFF_AXIS = 0.25
+"""Distance of the axis from the middle of a band, in head widths, from which the band is a face, wherever the fit
+began: half of what it is on a face."""
+
+TOP_ABOVE_M = 0.022
+"""Height of the top above the middle of a face and its corner."""
+
+MIN_GAIN = 6.0
+"""Gain of the log-likelihood from which a face is preferred to a crown, and one side to the other: odds of 400."""
+
+FLANK_SIGMA_M = 0.0012
+"""Standard error of the axis from one face: half of what head widths differ by, and a millimetre because the slope
+across of the head is not seen."""
+
+FLANK_TOP_SIGMA_M = 0.0012
+"""Standard error of the top from one face: where the face ends below depends on the rail and on the view."""
+
+LEAST_POINTS, SECTION_POINTS = 30, 60
+"""Points from which a head is looked for, and points of a section. On far rails of random worlds, the logarithms of the
+likelihoods of the two sides differ by 4 to 27 with 30 points, by 5 to 100 with 60."""
+
+DEPTH_M = 0.06
+"""Distance in height from most points within which those of a head are: its faces are 40 mm high."""
+
+BAND_POINTS = 41
+"""Successive points whose median is the band of a line. A line that was drawn from few points wanders about it by 3 cm
+in 20 m, so that a section about the line would be smeared."""
+
+MIN_FACE_SHARE = 0.2
+"""Least share of the points that are on a face: those of road beside a head, which is as high, are on none."""
+
+MAX_STRAY_SHARE, MAX_NOISE_M = 0.4, 0.008
+"""Largest share of points on no part of a head, and largest noise: what spreads further is ballast, or no rail."""
+
+NEAR_HEAD_M = 0.01
+"""Distance from the outline up to which a point is on the head: three times the noise of most scanners."""
+
+
+@dataclass(frozen=True)
+class Flank:
+    """A head that shows one face: offset of the axis to the left of the line, and top above the level of the points.
+
+    `sigma_m` is the standard error of the axis; half a head where the points may be on either face, and the axis is
+    then stated to be on them.
+    """
+
+    left_m: float
+    top_m: float
+    sigma_m: float
+
+
+@dataclass(frozen=True)
+class Beside:
+    """The axis at s stations, by the side of a head that sections show; NaN where they show none.
+
+    `offset`, (s,), is in metres to the left of the line, `information` the inverse of its variance that the points next
+    to a station alone contribute, 1/m², and `common` the standard error that a section shares, metres.
+    """
+
+    offset: np.ndarray
+    information: np.ndarray
+    common: np.ndarray
+
+
+@dataclass(frozen=True)
+class _Fit:
+    """The outline of a head, fitted to points: its axis to the left of their middle, its top above it, metres.
+
+    `side` is 1 where the axis is on the left of the points, -1 on their right, and 0 where they are about it. `stray`
+    and `face` are the shares of points on no part of the head, and on its faces.
+    """
+
+    likelihood: float
+    left_m: float
+    top_m: float
+    side: int
+    stray: float
+    face: float
+    noise_m: float
+
+    @property
+    def shows_face(self) -> bool:
+        """Whether these are the points of a head of which a face is seen."""
+        return self.stray <= MAX_STRAY_SHARE and self.face >= MIN_FACE_SHARE and self.noise_m <= MAX_NOISE_M
+
+
+def find_flank(points: HeadPoints) -> Flank | None:
+    """Find the head of a line whose points are on one face; None if they are not."""
+    across, head_width_m = points.across, points.width_m
+    if len(across) < MIN_ON_HEAD:
+        return None
+    low, high = np.percentile(across, BAND_PERCENTILES)
+    if high - low > MAX_BAND_SHARE * head_width_m:
+        return None
+    up = points.z - rough_level(points.t, points.z)
+    bottom, top = np.percentile(up, BAND_PERCENTILES)
+    if top - bottom < high - low + MIN_HEIGHT_M or top - bottom > 2 * FACE_DEPTH_M:
+        return None
+    middle = float(np.median(across))
+    likely = _likely(_fits(across - middle, up, head_width_m))
+    if any(fit.side == 0 for fit in likely):
+        return None
+    best = likely[0]
+    left_m, sigma_m = _axis(likely, head_width_m)
+    return Flank(middle + left_m, best.top_m, sigma_m)
+
+
+def beside_faces(points: HeadPoints, wanted: np.ndarray) -> Beside:
+    """Find the axis by the points of each section of a line that has `wanted` stations, (s,) bool.
+
+    Where points are many, sections show their outline, or something that is not a head alone. A scanner passes a rail
+    on one side: sections whose points may be on either face follow those that show which one they are on.
+    """
+    found = Beside(*np.full((3, len(wanted)), np.nan))
+    points, up = _as_high(points)
+    if len(points.t) < LEAST_POINTS:
+        return found
+    off_band = points.across - band_of(points)
+    parts, own = [], []
+    for first, last in borders(points.station, len(wanted), SECTION_POINTS):
+        start, end = np.searchsorted(points.station, [first, last])
+        if wanted[first:last].any() and end - start < MIN_SECTION_POINTS:
+            parts.append(slice(first, last))
+            own.append(np.arange(start, end))
+    fits = [_fits(off_band[mine], up[mine], points.width_m) for mine in own]
+    usual = _side_of(fits)
+    for part, mine, tried in zip(parts, own, fits):
+        likely = _likely(tried, usual)
+        if not likely[0].shows_face:
+            continue
+        left_m, found.common[part] = _axis(likely, points.width_m)
+        on_head = np.abs(off_band[mine] - left_m) < 0.5 * points.width_m + NEAR_HEAD_M
+        on_head &= up[mine] < likely[0].top_m + NEAR_HEAD_M
+        mean_m, found.information[part] = _by_station(points[mine[on_head]], part, off_band[mine][on_head])
+        found.offset[part] = mean_m + left_m
+    return found
+
+
+def band_of(points: HeadPoints) -> np.ndarray:
+    """Return the offset of the band of a line around each of its points, (n,) metres."""
+    return median_filter(points.across, min(BAND_POINTS, len(points.t)), mode="nearest")
+
+
+def _by_station(points: HeadPoints, part: slice, off_band: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the offset of the band at the stations of a section, by the points next to each, and its information.
+
+    Points, (n,), that are off the band on average, as on a corner, do not move it.
+    """
+    count, sums = (points.per_station(values)[part] for values in (None, points.across))
+    mean_m = np.where(count > 0, sums / np.maximum(count, 1), np.nan)
+    return mean_m - np.mean(off_band), count / max(np.var(off_band), MIN_NOISE_M**2)
+
+
+def _as_high(points: HeadPoints) -> tuple[HeadPoints, np.ndarray]:
+    """Return the points of a line that are about as high as most around them, and by how much they are higher, (n,)."""
+    if not len(points.t):
+        return points, points.z
+    up = points.z - rough_level(points.t, points.z)
+    near = np.abs(up) < DEPTH_M
+    return points[near], up[near]
+
+
+def _fits(across: np.ndarray, up: np.ndarray, head_width_m: float) -> list[_Fit]:
+    """Fit a head to points, by offsets from their middle and heights, (n,), as a crown and as either face.
+
+    The likeliest fit comes first.
+    """
+    grid, outline, half_m = Grid.of(head_width_m), Outline.of(head_width_m), 0.5 * head_width_m
+    fits = []
+    for left_m, top_m in ((0.0, 0.0), (-half_m, TOP_ABOVE_M), (half_m, TOP_ABOVE_M)):
+        bins = grid.number(across - left_m, up - top_m)
+        counts = np.bincount(bins[bins >= 0], minlength=grid.size).astype(float)
+        section = fit_section(counts, outline, grid)
+        outside, stray = len(up) - counts.sum(), float(section.shares[-1])
+        likelihood = log_likelihood(counts, section, outline, grid) + outside * np.log(stray / grid.size)
+        axis_m = left_m + float(section.place[0])
+        side = int(np.sign(axis_m)) if abs(axis_m) > OFF_AXIS * head_width_m else 0
+        shares = (outside + stray * counts.sum()) / len(up), float(section.shares[len(VIEWS_DEG) : -1].sum())
+        noise_m = float(np.exp(section.place[4:6].max()))
+        fits.append(_Fit(likelihood, axis_m, top_m + float(section.place[1]), side, *shares, noise_m))
+    return sorted(fits, key=lambda fit: -fit.likelihood)
+
+
+def _likely(fits: Sequence[_Fit], usual: int = 0) -> list[_Fit]:
+    """Return the fits that are about as likely as the first one; of those on both sides, those on the `usual` one."""
+    likely = [fit for fit in fits if fit.likelihood > fits[0].likelihood - MIN_GAIN]
+    return [fit for fit in likely if fit.side == usual] if usual and _on_both_sides(likely) else likely
+
+
+def _on_both_sides(fits: Sequence[_Fit]) -> bool:
+    """Return whether fits have the axis on the left of the points, and on their right."""
+    return {-1, 1} <= {fit.side for fit in fits}
+
+
+def _axis(likely: Sequence[_Fit], head_width_m: float) -> tuple[float, float]:
+    """Return the axis to the left of the points and its standard error, metres: on them if it may be on both sides."""
+    if _on_both_sides(likely):
+        return 0.0, 0.5 * head_width_m
+    return likely[0].left_m, float(np.hypot(FLANK_SIGMA_M, np.ptp([fit.left_m for fit in likely])))
+
+
+def _side_of(sections: Sequence[Sequence[_Fit]]) -> int:
+    """Return on which side of the points the axis is in most sections of a line that show it; 0 if there is none."""
+    sure = [likely for likely in map(_likely, sections) if not _on_both_sides(likely)]
+    return int(np.sign(sum(likely[0].side for likely in sure)))

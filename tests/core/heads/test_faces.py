@@ -1,0 +1,91 @@
+"""Heads of which a scanner shows one side."""
+
+import numpy as np
+import pytest
+from rail_extract.core.heads.axis import Axis
+from rail_extract.core.heads.faces import beside_faces, find_flank
+from rail_extract.core.heads.head_points import HeadPoints, stations_along
+
+WIDTH, UNSEEN, NOISE_M = 0.072, 0.04 / np.sqrt(12), 0.002
+
+
+def along(t, across, up, length_m):
+    """Points of a straight line, in order along it."""
+    order = np.argsort(t)
+    free = np.ones((2, len(stations_along(length_m))), dtype=bool)
+    return HeadPoints(t[order], across[order], up[order], WIDTH, np.array([[0.0, 0.0], [length_m, 0.0]]), free)
+
+
+def seen_from_right(count, length_m, seed, corner=0.5):
+    """Points of a head that a far scanner on its right sees: the right face, its corner and a little of the crown."""
+    rng = np.random.default_rng(seed)
+    below, turn = rng.uniform(0.013, 0.037, count), rng.uniform(0.2, np.pi / 2, count)
+    off = np.full(count, WIDTH / 2)
+    on_corner, on_crown = rng.random(count) < corner, rng.random(count) < 0.15
+    off[on_corner], below[on_corner] = 0.023 + 0.013 * np.sin(turn[on_corner]), 0.014 - 0.013 * np.cos(turn[on_corner])
+    off[on_crown], below[on_crown] = rng.uniform(0.005, 0.023, on_crown.sum()), 0.0
+    t, noise = rng.uniform(0, length_m, count), rng.normal(0, NOISE_M, (2, count))
+    return t, noise[0] - off, noise[1] - below
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+@pytest.mark.parametrize("seed", [1, 7, 11])
+def test_a_face_with_much_of_its_corner_is_not_taken_for_a_crown(seed, side):
+    """The fit of a crown slides onto such a face: where fits agree, the side is certain."""
+    rng, count = np.random.default_rng(seed), 150
+    below, from_axis, turn = (
+        rng.uniform(0.013, 0.04, count),
+        np.full(count, WIDTH / 2),
+        rng.uniform(0.2, np.pi / 2, count),
+    )
+    corner = rng.random(count) < 0.6
+    from_axis[corner], below[corner] = 0.023 + 0.013 * np.sin(turn[corner]), 0.014 - 0.013 * np.cos(turn[corner])
+    t, noise_m = np.sort(rng.uniform(0, 22, count)), 0.002
+    across = side * (from_axis - WIDTH / 2 + rng.normal(0, noise_m, count))
+    flank = find_flank(along(t, across, -below + rng.normal(0, noise_m, count), 22.0))
+    assert flank is not None
+    assert abs(flank.left_m + side * WIDTH / 2) < 0.006
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("mirror", [-1, 1])
+def test_a_few_points_of_a_far_rail_show_the_side_of_its_axis(seed, mirror):
+    """In worlds 8084 and 8120, lines with two points per metre were on the face or on the wrong side of it."""
+    length_m = 80.0
+    t, across, up = seen_from_right(160, length_m, seed)
+    wander_m = 0.036 + 0.02 * np.sin(t / 12)  # the line is on the face, and wanders about it
+    points = along(t, mirror * (across + wander_m), up, length_m)
+    axis = Axis.of(points, UNSEEN, by_outline=False)
+    stations = np.arange(5.0, 75.0)
+    off_m = axis.course.at(stations) - mirror * (0.036 + 0.02 * np.sin(stations / 12))
+    assert np.sqrt(np.mean(off_m**2)) < 0.012
+
+
+def test_a_section_that_may_be_on_either_face_follows_the_rest_of_its_line():
+    """Points of the face alone, as where a train hides the crown, do not tell one face from the other."""
+    face_t, face, below = seen_from_right(70, 40.0, 3)
+    rng = np.random.default_rng(3)
+    face, below = rng.normal(-WIDTH / 2, NOISE_M, 70), -rng.uniform(0.012, 0.037, 70)
+    t, across, up = seen_from_right(140, 40.0, 4)
+    wanted = np.ones(len(stations_along(80.0)), dtype=bool)
+    alone = beside_faces(along(face_t, face, below, 40.0), wanted[:160])
+    assert np.nanmedian(alone.common) == pytest.approx(WIDTH / 2)
+    both = along(np.append(face_t, t + 40), np.append(face, across), np.append(below, up), 80.0)
+    beside = beside_faces(both, wanted)
+    assert np.nanmax(beside.common) < 0.01
+    assert abs(np.nanmedian(beside.offset[:150])) < 0.006
+
+
+def test_scattered_points_show_no_head():
+    """In world 8109, 50 points of ballast along a rail that nobody sees were taken for one."""
+    rng = np.random.default_rng(0)
+    points = along(rng.uniform(0, 90, 50), rng.uniform(-0.09, 0.09, 50), rng.normal(0, 0.01, 50), 90.0)
+    beside = beside_faces(points, np.ones(len(points.stations), dtype=bool))
+    assert not np.isfinite(beside.offset).any()
+
+
+@pytest.mark.parametrize("count", [0, 1, 29, 31])
+def test_hardly_any_points_stop_nothing(count):
+    points = along(*seen_from_right(count, 20.0, 0), 20.0)
+    beside = beside_faces(points, np.ones(len(points.stations), dtype=bool))
+    assert np.isfinite(beside.offset).any() == (count == 31)
