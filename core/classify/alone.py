@@ -28,6 +28,10 @@ where the other rail is hidden, and from 0.6 on beside third rails, guard rails 
 LOWEST_M = 0.02
 """Height by which lower ground may be above the bed, which scatters as much."""
 
+UNDER_FOOT_M = 0.20
+"""Height of a head above the bed from which its bed is seen below the foot of the rail, too, and lower ground at the
+place of a head does not show that there is none: the tallest rails have 190 mm, and 10 mm of pad."""
+
 FACE_M, BELOW_M = (0.01, 0.025), (0.055, 0.10)
 """Depths below the top of the face of a head, and of what is below the head: its web, above the foot. The face of the
 lightest rails ends at 25 mm."""
@@ -58,7 +62,7 @@ def may_hide_partner(lines: Lines, piece: np.ndarray, tops: Tops, settings: Sett
     is none, where it is seen as often as on the way there.
     """
     low_m = lines.height - height_m
-    hidden = mean_of(low_m, piece) < LOWEST_M
+    hidden = (mean_of(low_m, piece) < LOWEST_M) | (mean_of(lines.height, piece) > UNDER_FOOT_M)
     for left_m in [side * spacing_m for spacing_m in settings.spacings_m for side in (1, -1)]:
         on_the_way = _lower(lines, piece, left_m * WAY, low_m, tops)
         for place_m in left_m + SPACING_M * PLACES:

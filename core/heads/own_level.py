@@ -7,6 +7,7 @@ docs/method.md section 6.8.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -44,8 +45,7 @@ SLOPE_BINS = 41
 
 MIN_BINS = 4
 """Bins, 2 m, of a level that counts, because what stands out by chance is shorter, and of its end that is compared with
-the next bin; a level runs across fewer bins that lack it. Two pieces of one level may overlap by twice as many: where
-points are few, one bin that is off begins another piece."""
+the next bin; a level runs across fewer bins that lack it."""
 
 DRIFT = 0.004
 """Error of the gradient, by which the levels on both sides of a gap may differ per metre, and at most `MAX_DRIFT_M`."""
@@ -190,29 +190,42 @@ def _pieces(levels: _Levels, step_m: float) -> list[np.ndarray]:
     return [np.column_stack(piece) for piece in pieces if len(piece[0]) >= MIN_BINS]
 
 
+def _step_between(earlier: np.ndarray, later: np.ndarray) -> float:
+    """Return by how much two levels differ where one follows the other, or where both are, metres."""
+    ending = max(MIN_BINS, int(np.count_nonzero(earlier[:, 0] >= later[0, 0])))
+    beginning = max(MIN_BINS, int(np.count_nonzero(later[:, 0] <= earlier[-1, 0])))
+    return float(abs(np.median(later[:beginning, 1]) - np.median(earlier[-ending:, 1])))
+
+
+def _weight(piece: np.ndarray, pieces: Sequence[np.ndarray]) -> float:
+    """Return how much a level counts, in bins: less if it is a vehicle's, which shows where another is far below it."""
+    near = VEHICLE_NEAR_M / LEVEL_BIN_M
+    for other in pieces:
+        own, below = _near(piece, other, near), _near(other, piece, near)
+        if len(own) and len(below) and np.median(below) < np.median(own) - VEHICLE_M:
+            return VEHICLE_WEIGHT * len(piece)
+    return float(len(piece))
+
+
+def _near(piece: np.ndarray, other: np.ndarray, near: float) -> np.ndarray:
+    """Return the heights of a level in the bins that are `near` another one, (k,)."""
+    return piece[(piece[:, 0] >= other[0, 0] - near) & (piece[:, 0] <= other[-1, 0] + near), 1]
+
+
 def _chain(pieces: list[np.ndarray], step_m: float) -> np.ndarray:
     """Choose the pieces that one rail can have, with most bins: their bins and heights, (k, 2)."""
     if not pieces:
         return np.empty((0, 2))
     pieces.sort(key=lambda piece: piece[0, 0])
     start, end = np.array([[piece[0, 0], piece[-1, 0]] for piece in pieces]).T
-    first, last, middle = np.array(
-        [[np.median(piece[:MIN_BINS, 1]), np.median(piece[-MIN_BINS:, 1]), np.median(piece[:, 1])] for piece in pieces]
-    ).T
-    weight = np.array([float(len(piece)) for piece in pieces])
-    near = VEHICLE_NEAR_M / LEVEL_BIN_M
-    for number in range(len(pieces)):
-        beside = (start <= end[number] + near) & (end >= start[number] - near)
-        if np.any(beside & (middle < middle[number] - VEHICLE_M)):
-            weight[number] *= VEHICLE_WEIGHT
+    weight = np.array([_weight(piece, pieces) for piece in pieces])
     best, before = weight.copy(), np.full(len(pieces), -1)
     for number in range(1, len(pieces)):
         gap_m = (start[number] - end[:number]) * LEVEL_BIN_M
-        off_m = np.abs(first[number] - last[:number])
+        off_m = np.array([_step_between(earlier, pieces[number]) for earlier in pieces[:number]])
         fits = off_m <= step_m + np.clip(DRIFT * gap_m, 0.0, MAX_DRIFT_M)
         cost = np.where(fits, 0.0, np.where(off_m <= SHIFTED_M, SHIFT_BINS, np.inf))
-        along = (gap_m > 0) | (fits & (gap_m > -2 * MIN_BINS * LEVEL_BIN_M))
-        sums = np.where(along, best[:number] - cost, 0.0)
+        sums = np.where((gap_m > 0) | fits, best[:number] - cost, 0.0)
         if sums.max() > 0:
             before[number] = int(np.argmax(sums))
             best[number] += sums.max()

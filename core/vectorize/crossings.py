@@ -60,7 +60,8 @@ def resolve_crossings(network: LineNetwork) -> LineNetwork:
     network, facing = _cut_beside_ends(network)
     for shared, legs in (*_crossings(network), *facing):
         pairing = _best_pairing(network, legs)
-        crosses = (shared, legs) not in facing or tuple(legs)[:2] not in pairing
+        # The first two legs leave one end of a shared line: as one rail, they would leave the line to none.
+        crosses = len(shared) != 1 or tuple(legs)[:2] not in pairing
         if pairing and crosses and not any(end in cuts_m for end in legs):
             joins.update(pairing)
             cuts_m.update(legs)

@@ -118,6 +118,13 @@ def test_a_lone_bar_is_a_rail_where_something_may_hide_the_other_one(wide_m, kep
     assert classify_square(rough(xyz, rng)[~hidden], SETTINGS).rail.any() == kept
 
 
+@pytest.mark.parametrize(("height_m", "kept"), [(0.17, False), (0.25, True)])
+def test_ground_below_the_place_of_the_other_rail_shows_no_rail_only_where_its_foot_would_hide_it(height_m, kept):
+    rng = np.random.RandomState(21)
+    xyz, _ = with_bar(flat(10.0, rng=rng, per_m2=2000), WIDTH, 0.3, -1.0, height_m)
+    assert classify_square(rough(xyz, rng), SETTINGS).rail.any() == kept
+
+
 @pytest.mark.parametrize(("behind_m", "kept"), [(0.0, False), (0.028, True)])
 def test_a_lone_bar_overhangs_if_it_is_a_rail(behind_m, kept):
     """A scanner sees the face of its head, and what is below: a web, 28 mm behind the face, or more of the face."""

@@ -47,6 +47,12 @@ def test_a_train_that_stands_on_the_rail_is_not_even_where_it_hides_most_of_it()
     assert train.mean() < 0.01
 
 
+@pytest.mark.parametrize("wave_m", [0.04, 0.06])
+def test_a_rail_whose_level_drifts_is_not_a_vehicle_where_noise_breaks_it_into_pieces(wave_m):
+    (rail,) = own(band(0, 100, 70, noise=0.015, profile=lambda t: wave_m * np.sin(2 * np.pi * t / 140)))
+    assert rail.mean() > 0.9
+
+
 def test_weeds_are_not_on_the_level():
     random = np.random.default_rng(5)
     weeds = np.column_stack([random.uniform(0, 60, 40), random.uniform(-0.03, 0.03, 40), random.uniform(0.05, 0.1, 40)])

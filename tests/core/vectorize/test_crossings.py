@@ -76,3 +76,19 @@ def test_check_rails_that_face_each_other_beside_a_rail_do_not_cross_it():
     found = resolve_crossings(apart)
     assert sorted(map(len, found.lines)) == sorted(map(len, apart.lines))
     assert all(np.ptp(line[:, 1]) == 0 for line in found.lines)
+
+
+@pytest.mark.parametrize("length_m", [6.0, 9.0, 13.0])
+def test_the_rail_between_the_toe_and_the_frog_of_a_short_turnout_is_not_the_shared_part_of_a_crossing(length_m):
+    x = np.arange(0.2, 25.0, 0.2)
+    nodes = [(0.0, 0.0), (length_m, 0.0)]
+    legs = [
+        (0, np.column_stack([-x, 0 * x])),
+        (0, np.column_stack([x, x**2 / 400])),
+        (1, np.column_stack([length_m + x, 0 * x])),
+        (1, np.column_stack([length_m - x[:-60], (length_m - x[:-60]) ** 2 / 400 - length_m**2 / 400])),
+    ]
+    turnout = network(legs, [(0, (length_m / 2, 0.0), 1)], nodes)
+    found = resolve_crossings(turnout)
+    on_it = [line for line in found.lines if np.any((np.abs(line[:, 0] - length_m / 2) < 0.5) & (line[:, 1] == 0))]
+    assert len(on_it) == 1
