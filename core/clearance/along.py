@@ -69,8 +69,8 @@ HEIGHT_COST, POINT_GAIN, POINTS_GAIN, NONE_COST = 0.3, 0.15, 6, 0.8
 """Cost of a metre of height, gain of each of the first points, their number, and cost of a piece without a wire: the
 lowest thing that goes on is the contact wire, not the messenger, a dropper or an arm."""
 
-TURN_M, RISE_M, CHANGE_CAP, ENTER_COST = 0.03, 0.02, 12.0, 3.0
-"""Change across and in height that costs 1, the largest such cost, and the cost of a gap on either side."""
+TURN_M, RISE_M, ENTER_COST = 0.03, 0.02, 3.0
+"""Change across and in height that costs 1, and the cost of a gap on either side: a larger change costs a gap."""
 
 NEAR_M = 0.05, 0.035
 """Points within these distances of the chain, across and in height, are of the wire."""
@@ -297,8 +297,7 @@ def _chain(groups: Sequence[np.ndarray]) -> np.ndarray:
         gain = HEIGHT_COST * (own[:, 1] - WIRE_HEIGHT_M[0]) - POINT_GAIN * np.minimum(own[:, 2], POINTS_GAIN)
         change = np.full((len(before) + 1, len(own) + 1), ENTER_COST)
         change[-1, -1] = 0.0
-        turn = np.abs(before[:, None, :2] - own[None, :, :2]) @ (1 / TURN_M, 1 / RISE_M)
-        change[:-1, :-1] = np.minimum(turn, CHANGE_CAP)
+        change[:-1, :-1] = np.abs(before[:, None, :2] - own[None, :, :2]) @ (1 / TURN_M, 1 / RISE_M)
         total = costs[:, None] + change
         back.append(np.argmin(total, axis=0))
         costs = total.min(axis=0) + np.append(gain, NONE_COST)
