@@ -190,8 +190,8 @@ def _pieces(levels: _Levels, step_m: float) -> list[np.ndarray]:
     return [np.column_stack(piece) for piece in pieces if len(piece[0]) >= MIN_BINS]
 
 
-def _step_between(earlier: np.ndarray, later: np.ndarray) -> float:
-    """Return by how much two levels differ where one follows the other, or where both are, metres."""
+def _apart(earlier: np.ndarray, later: np.ndarray) -> float:
+    """Return by how much two levels differ where both are, metres."""
     ending = max(MIN_BINS, int(np.count_nonzero(earlier[:, 0] >= later[0, 0])))
     beginning = max(MIN_BINS, int(np.count_nonzero(later[:, 0] <= earlier[-1, 0])))
     return float(abs(np.median(later[:beginning, 1]) - np.median(earlier[-ending:, 1])))
@@ -201,6 +201,8 @@ def _weight(piece: np.ndarray, pieces: Sequence[np.ndarray]) -> float:
     """Return how much a level counts, in bins: less if it is a vehicle's, which shows where another is far below it."""
     near = VEHICLE_NEAR_M / LEVEL_BIN_M
     for other in pieces:
+        if other[0, 0] > piece[-1, 0] + near or other[-1, 0] < piece[0, 0] - near:
+            continue
         own, below = _near(piece, other, near), _near(other, piece, near)
         if len(own) and len(below) and np.median(below) < np.median(own) - VEHICLE_M:
             return VEHICLE_WEIGHT * len(piece)
@@ -218,11 +220,14 @@ def _chain(pieces: list[np.ndarray], step_m: float) -> np.ndarray:
         return np.empty((0, 2))
     pieces.sort(key=lambda piece: piece[0, 0])
     start, end = np.array([[piece[0, 0], piece[-1, 0]] for piece in pieces]).T
+    first, last = np.array([[np.median(piece[:MIN_BINS, 1]), np.median(piece[-MIN_BINS:, 1])] for piece in pieces]).T
     weight = np.array([_weight(piece, pieces) for piece in pieces])
     best, before = weight.copy(), np.full(len(pieces), -1)
     for number in range(1, len(pieces)):
         gap_m = (start[number] - end[:number]) * LEVEL_BIN_M
-        off_m = np.array([_step_between(earlier, pieces[number]) for earlier in pieces[:number]])
+        off_m = np.abs(first[number] - last[:number])
+        for earlier in np.flatnonzero(gap_m <= 0):
+            off_m[earlier] = _apart(pieces[earlier], pieces[number])
         fits = off_m <= step_m + np.clip(DRIFT * gap_m, 0.0, MAX_DRIFT_M)
         cost = np.where(fits, 0.0, np.where(off_m <= SHIFTED_M, SHIFT_BINS, np.inf))
         sums = np.where((gap_m > 0) | fits, best[:number] - cost, 0.0)
