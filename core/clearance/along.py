@@ -62,8 +62,8 @@ GROUPS, THICK_M, WIDE_M, LEAST_IN_GROUP = 4, 0.04, 0.06, 2
 number of points."""
 
 BESIDE_M, BESIDE_UP_M = (0.08, 0.40), 0.06
-"""Aside and in height: where there are no more points than in a group, because a wire is thin, unlike roofs, beams and
-leaves."""
+"""Aside and in height: around a wire, this space holds no more points than the wire, which is thin, unlike roofs, beams
+and leaves."""
 
 HEIGHT_COST, POINT_GAIN, POINTS_GAIN, NONE_COST = 0.3, 0.15, 6, 0.8
 """Cost of a metre of height, gain of each of the first points, their number, and cost of a piece without a wire: the

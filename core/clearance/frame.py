@@ -52,7 +52,7 @@ class Course:
     """A track at stations of equal distance in plan, `STEP_M` or a little less; (n,) arrays.
 
     `xyz`, (n, 3), are metres from the zero of the coordinate system. Curvature, 1/m, is positive to the left, grade
-    uphill. The cant, left minus right rail top, is 0 where there are no rails; `spacing_m` is the 3D distance of both
+    uphill. The cant, left minus right rail top, is 0 where rails are missing; `spacing_m` is the 3D distance of both
     tops, and the height of a rail is interpolated where it is `bridged`. `wide_m`, (n, 2), is what the profile is
     widened by on the left and on the right.
 

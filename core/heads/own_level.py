@@ -201,16 +201,14 @@ def _weight(piece: np.ndarray, pieces: Sequence[np.ndarray]) -> float:
     """Return how much a level counts, in bins: less if it is a vehicle's, which shows where another is far below it."""
     near = VEHICLE_NEAR_M / LEVEL_BIN_M
     for other in pieces:
-        if other[0, 0] > piece[-1, 0] + near or other[-1, 0] < piece[0, 0] - near:
-            continue
-        own, below = _near(piece, other, near), _near(other, piece, near)
-        if len(own) and len(below) and np.median(below) < np.median(own) - VEHICLE_M:
+        is_near = other[0, 0] <= piece[-1, 0] + near and other[-1, 0] >= piece[0, 0] - near
+        if is_near and np.median(_near(other, piece, near)) < np.median(_near(piece, other, near)) - VEHICLE_M:
             return VEHICLE_WEIGHT * len(piece)
     return float(len(piece))
 
 
 def _near(piece: np.ndarray, other: np.ndarray, near: float) -> np.ndarray:
-    """Return the heights of a level in the bins that are `near` another one, (k,)."""
+    """Return the heights of a level in the bins that are within `near` bins of another one, (k,)."""
     return piece[(piece[:, 0] >= other[0, 0] - near) & (piece[:, 0] <= other[-1, 0] + near), 1]
 
 

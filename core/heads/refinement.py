@@ -49,7 +49,7 @@ HEEL_SPREAD_M = 0.15
 
 EMPTY_SHARE = 0.4
 """Between the edges of a straight blade and of an arc, point density relative to that on the adjacent head below which
-there is no head. Noise of a centimetre fills a quarter, and leaves three quarters of a head that is there."""
+a head is ruled out. Noise of a centimetre fills an empty gap to a quarter, and leaves three quarters of a head."""
 
 MIN_ON_HEAD = 20
 """With fewer points on the adjacent head, the branch is taken for an arc, as most are."""
