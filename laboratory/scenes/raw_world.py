@@ -333,19 +333,19 @@ def pavement(
     half_width_m: float | None = None,
     roughness_m: float = 0.0015,
     lift_m: float = 0.0,
+    rails: Sequence[tuple[np.ndarray, np.ndarray, int]] | None = None,
 ) -> None:
     """Pave profiles up to the top of the rails, with a groove, width and depth, inside each rail.
 
-    `gap_m` is a gap at the outer side of the rails; without `half_width_m`, the whole section is paved.
+    `gap_m` is a gap at the outer side of the rails; without `half_width_m`, the whole section is paved. `rails` are the
+    place to the left, height and side of each; without them, they are those of even tracks cut at right angles.
     """
     half, head = half_width_m or world.half_width_m, world.head_width_m / 2
     cuts = []
-    for way in world.ways:
-        for side in (1, -1):
-            left, top = rail_place(way, side)
-            inner = left - side * (head + groove_m[0])
-            outer = left + side * (head + gap_m)
-            cuts.append((np.minimum(inner, outer), np.maximum(inner, outer), left, top, side))
+    for left, top, side in rails or [(*rail_place(way, side), side) for way in world.ways for side in (1, -1)]:
+        inner = left - side * (head + groove_m[0])
+        outer = left + side * (head + gap_m)
+        cuts.append((np.minimum(inner, outer), np.maximum(inner, outer), left, top, side))
     count = len(world.station)
     order = np.argsort([np.nanmean(cut[2]) for cut in cuts])
     edge, level = np.full(count, -half), cuts[order[0]][3] + lift_m

@@ -41,12 +41,17 @@ def cut(world: World, head: Railhead, side: int = 0) -> Laid:
     return Laid(place, top, turn, side)
 
 
+def cut_all(world: World, tracks: Sequence[Track]) -> list[Laid]:
+    """Cut the railheads of tracks with the profiles of a world."""
+    return [cut(world, track.railhead(side), side) for track in tracks for side in track.sides]
+
+
 def lay(world: World, tracks: Sequence[Track], where: np.ndarray | None = None) -> None:
     """Lay the rails of tracks in some profiles with fastenings, and check and wing rails at their frogs.
 
     All tracks run in the direction of the reference line.
     """
-    laid = [cut(world, track.railhead(side), side) for track in tracks for side in track.sides]
+    laid = cut_all(world, tracks)
     for number, one in enumerate(laid):
         whole = ~_in_flangeways(one, [other for other in laid if other is not one], world.head_width_m)
         seen = whole if where is None else whole & where

@@ -26,7 +26,7 @@ from ..scenes.raw_world import (
     ways_of,
 )
 from .draws import chosen, even_in_log, maybe, one_of, stream
-from .rails import lay
+from .rails import cut_all, lay
 from .railway import Railway
 from .surveys import FROM_ABOVE, TRIPOD
 
@@ -247,16 +247,21 @@ def _base(
     lined, deck_m = rng.uniform(3.0, 4.0), rng.uniform(1.5, 3.0)
     depth_m = rng.uniform(4.0, 9.0)
 
+    def paved(world: World, where: np.ndarray) -> None:
+        # Profiles that are turned meet the rails of a track at different chainages.
+        rails = [(one.left_m, one.top_m, one.side) for one in cut_all(world, railway.tracks)]
+        pavement(world, where, groove, gap_m, roughness_m=rough_m, rails=rails)
+
     def laid(world: World) -> None:
         if bed == STREET:
-            pavement(world, np.ones(len(world.station), dtype=bool), groove, gap_m, roughness_m=rough_m)
+            paved(world, np.ones(len(world.station), dtype=bool))
             return
         # On a street, rails are crowns between the stones: their feet are never seen.
         road = np.zeros(len(world.station), dtype=bool) if crossing is None else world.between(*crossing)
         ground(world, terrain.heights(world), ~road)
         lay(world, railway.tracks, ~road)
         if crossing is not None:
-            pavement(world, road, groove, gap_m, roughness_m=rough_m)
+            paved(world, road)
 
     low, high = railway.lefts_m
     middle = (low + high) / 2

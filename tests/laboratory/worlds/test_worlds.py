@@ -38,6 +38,16 @@ def test_points_on_heads_are_around_the_truth(world):
     assert np.median(off[:, 2]) > -0.03
 
 
+def test_heads_in_a_street_are_on_their_rails_where_profiles_are_turned_and_the_track_rises():
+    world = make(9089)
+    assert world.survey.scanners[0].turned > 0.5
+    on_head = world.scene.xyz[world.scene.kind == HEAD]
+    rails = cut(world.scene.rails)
+    feet, number = rails.nearest(on_head)
+    for rail in np.unique(rails.number):
+        assert abs(np.median((on_head - feet)[rails.number[number] == rail, 2])) < 0.005
+
+
 def test_many_worlds_differ_in_what_counts():
     railways = [draw_railway(seed) for seed in range(1, 61)]
     assert len({one.standard.name for one in railways}) > 20
