@@ -68,9 +68,10 @@ REACH_M = 10.0
 ABREAST = np.cos(np.radians(20.0))
 """Cosine of the angle between a line and a track up to which the line runs next to the track; bridges cross it."""
 
-SAME_BED_M, MAX_STEP_M = 2.5, 0.3
-"""Up to this distance from the axis of a track, a line is on the bed of that track, and no rail of it is further above
-or below the track's rails than this: conductor rails and racks reach 0.15 m. Platforms begin at 0.38 m."""
+SAME_BED_M, MAX_STEP_M = 4.25, 0.3
+"""Up to this distance from the axis of a track, a line is on its bed or on one that touches it: beds reach
+2.5 m to either side of an axis, and the nearer rail is half a gauge before its own. No rail on them is further above or
+below the track's rails than this: conductor rails and racks reach 0.15 m. Platforms begin at 0.38 m."""
 
 BANK = 1 / 1.5
 """Slope of a bank: by how much per metre the bed of the next track may be higher or lower."""
