@@ -43,6 +43,11 @@ MEDIAN_SIGMA = 1.25
 MAX_CHANGE = 0.2
 """Largest change of that share that a change of the view explains: a larger one is the shadow of something."""
 
+OTHER_SIDE = 0.25
+"""Change of that share between the halves of a section from which they are seen from other sides, as between two places
+of a tripod on either side of a track: half of what the shares of the two sides differ by, 0.5 to 0.8. The section is
+divided."""
+
 SHARE_STATIONS = 8
 """Stations, 2 m, in which the share of points on the left is found; their median is that of the half."""
 
@@ -173,7 +178,8 @@ def outline_middles(points: HeadPoints, seen: np.ndarray) -> Middles:
     used = (bins >= 0) & seen[points.station]
     left, up, station, bins = left[used], up[used], points.station[used], bins[used]
     section: Section | None = None
-    for first, last in borders(station, count):
+    for first, last, is_part in _views(borders(station, count), station, left > 0):
+        section = None if is_part else section
         here = slice(*np.searchsorted(station, [first, last]))
         counts = np.bincount(bins[here], minlength=grid.size).astype(float)
         if counts.sum() < MIN_SECTION_POINTS:
@@ -345,6 +351,30 @@ def borders(station: np.ndarray, count: int, least: int = MIN_SECTION_POINTS) ->
     return list(zip(found[:-1], found[1:]))
 
 
+def _views(
+    sections: Sequence[tuple[int, int]], station: np.ndarray, is_left: np.ndarray, is_part: bool = False
+) -> Iterator[tuple[int, int, bool]]:
+    """Divide sections whose halves show other parts of the head, as long as both have enough points.
+
+    `station`, ascending, and `is_left` of the line are those of each point. Yields whether a section is part of another
+    one: what the section before shows is then no estimate of it.
+    """
+    for first, last in sections:
+        middle = (first + last) // 2
+        start, half, end = np.searchsorted(station, [first, middle, last])
+        is_full = min(half - start, end - half) >= MIN_SECTION_POINTS
+        if is_full and abs(_change(station, is_left, start, half, end)) > OTHER_SIDE:
+            yield from _views([(first, middle), (middle, last)], station, is_left, is_part=True)
+        else:
+            yield first, last, is_part
+
+
+def _change(station: np.ndarray, is_left: np.ndarray, start: int, half: int, end: int) -> float:
+    """Return by how much the share of points on the left is larger in `half` to `end` than in `start` to `half`."""
+    before, after = slice(start, half), slice(half, end)
+    return _share(station[after], is_left[after]) - _share(station[before], is_left[before])
+
+
 def _pull(station: np.ndarray, is_left: np.ndarray, count: int) -> np.ndarray:
     """Return how far middles of a section are pulled to the left because the view changes along it, (count,) metres.
 
@@ -355,7 +385,7 @@ def _pull(station: np.ndarray, is_left: np.ndarray, count: int) -> np.ndarray:
     half = int(np.searchsorted(station, count // 2))
     if not 0 < half < len(station):
         return np.zeros(count)
-    change = _share(station[half:], is_left[half:]) - _share(station[:half], is_left[:half])
+    change = _change(station, is_left, 0, half, len(station))
     chance = CHANGE_SIGMAS * MEDIAN_SIGMA * np.sqrt(0.25 / half + 0.25 / (len(station) - half))
     if not chance < abs(change) <= MAX_CHANGE:
         return np.zeros(count)

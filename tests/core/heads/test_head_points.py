@@ -34,6 +34,17 @@ def test_strips_show_what_they_are_beside_a_line_that_several_show(aside_m):
     np.testing.assert_allclose(kinds, [[50, 0], [0, 50]], atol=0.5)
 
 
+def test_faces_that_tripods_on_either_side_see_are_no_ridge():
+    """From 15 degrees, a face of 25 mm has seven times as many points as the crown; half of the line shows either."""
+    rng = np.random.RandomState(2)
+    x, y = rng.uniform(0, 50, 4000), rng.uniform(-0.036, 0.036, 4000)
+    on_face = rng.random_sample(4000) < 0.8
+    y[on_face] = np.where(x[on_face] < 25, 0.035, -0.035) + rng.normal(0, 0.001, on_face.sum())
+    z = np.where(on_face, rng.uniform(-0.035, -0.005, 4000), 0.0) + rng.normal(0, 0.003, 4000)
+    near = near_lines([np.array([[0.0, 0.0], [50.0, 0.0]])], np.column_stack([x, y, z]), WIDTH)
+    assert not near[0].is_blunt
+
+
 def test_a_strip_without_points_is_of_no_kind():
     empty = near_lines([np.array([[0.0, 0.0], [50.0, 0.0]])], np.empty((0, 3)), WIDTH, blunt=False)
     assert lengths_by_kind([about_crest(one) for one in empty]).tolist() == [0, 0]
