@@ -133,7 +133,7 @@ class Near:
         inside = np.abs(self.across) < WIDEST_M
         # Whole numbers add up to the same sum in any order of the points.
         across, number = np.round(self.across[inside] * TENTHS_OF_MM), piece[self.cell[inside]]
-        count = int(piece.max()) + 1
+        count = int(piece.max()) + 1 if len(piece) else 0
         points = np.maximum(np.bincount(number, minlength=count), 1)
         mean = np.bincount(number, across, count) / points
         spread = np.sqrt(np.maximum(np.bincount(number, across**2, count) / points - mean**2, 0))

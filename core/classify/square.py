@@ -228,12 +228,17 @@ def _on_bars(
     heads = whole_heads(shown.tops, _completed(found, kept, settings, tolerances), tolerances)
     chosen = label(shown.tops, heads, shown.cell, shown.height, tolerances)
     beside = Near.find(shown.xy[chosen], kept.lines)
-    narrow, *kinds = _widths(kept, beside, shown, settings, tolerances)
+    piece = pieces_of(len(kept.cell), kept.pairs)
+    width_m, share_m = beside.widths(piece), _share_m(kept, settings)
+    narrow = (width_m < settings.head_width_m + tolerances.wider_m)[piece]
+    kinds = _by_shape(kept, piece, width_m, narrow, shown, settings)
+    sharp_m, round_m, unsure_m = (float(share_m[kind].sum()) for kind in kinds)
     if settings.way is Way.FILLED:
         narrow &= _are_flat(kept, chosen, shown, settings.head_width_m)
-    standing = _wanted(kept, narrow, chosen, beside, thin, settings, tolerances)
-    share_m = _share_m(kept, settings)
-    sharp_m, round_m, unsure_m = (float(share_m[kind].sum()) for kind in kinds)
+    kept = _with_kept_partners(kept.of(narrow), settings, tolerances)
+    beside = Near.find(shown.xy[chosen], kept.lines)
+    rails = _are_rails(kept, beside, shown, settings, tolerances)
+    standing = _wanted(kept, rails, chosen, beside, thin, settings, tolerances)
     return replace(standing, sharp_m=sharp_m, round_m=round_m, unsure_m=unsure_m)
 
 
@@ -385,43 +390,33 @@ def _near_axes(marks: Marks, kept: Kept, settings: Settings, height_m: float) ->
     return near.on((settings.head_width_m + settings.cell_m) / 2, level)
 
 
-def _widths(
-    kept: Kept, beside: Near, shown: Shown, settings: Settings, tolerances: Tolerances
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Judge the cells by the width of the tops of their pieces.
+def _with_kept_partners(kept: Kept, settings: Settings, tolerances: Tolerances) -> Kept:
+    """Keep the pieces whose partners are kept as well, and of the others what may be a rail without a partner.
 
-    Parameters
-    ----------
-    kept : Kept
-    beside : Near
-        Points in the height of the heads, and the cells near them.
-    shown : Shown
-    settings : Settings
-    tolerances : Tolerances
-
-    Returns
-    -------
-    narrow : (n,) bool array
-        Rails: as narrow as a head in a square of this density.
-    sharp, rounded, unsure : (n,) bool arrays
-        Those with a partner that are as narrow as a head in a sharp cloud, those that are wider and round, and those
-        that are wider and steep, but not too wide for a rail.
+    What was at gauge from a piece may have turned out to be too wide for a head, or too short for a rail.
     """
-    if not len(kept.cell):
-        return (np.zeros(0, dtype=bool),) * 4
-    piece = pieces_of(len(kept.cell), kept.pairs)
-    width_m = beside.widths(piece)
+    partnered = with_partner(kept.pairs, _paired(kept.lines, settings, tolerances))
+    kept = replace(kept, paired=kept.paired & partnered)
+    kept = kept.of(partnered | _certain(kept.lines, kept.paired, kept.pairs))
+    return kept.of(_long(kept, settings, settings.keep_single, tolerances.least_m))
+
+
+def _by_shape(
+    kept: Kept, piece: np.ndarray, width_m: np.ndarray, narrow: np.ndarray, shown: Shown, settings: Settings
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return which cells with a partner show a sharp cloud, which are round, and which are neither, (n,) bool each.
+
+    Those that are as narrow as a head in a sharp cloud, those that are wider and round, and those that are wider and
+    steep, but `narrow`, (n,), enough for a rail. Pieces have a width, (pieces,).
+    """
     partnered = with_partner(kept.pairs, kept.paired)
-    narrow = width_m < settings.head_width_m + tolerances.wider_m
-    rails = kept.lines.height[partnered & narrow[piece] & (lengths(kept.lines.axis, piece) >= LEAST_SINGLE_M)[piece]]
-    alone = _stands_alone(kept, piece, width_m, rails, shown, settings, tolerances)
     sharp = partnered & (width_m < settings.head_width_m + SHARP_WIDER_M)[piece]
     rounded = unsure = partnered & ~sharp
     if rounded.any():
         spread_m = Ridges.measure(shown.xy, shown.height, kept.lines, piece).spread_m
         rounded = rounded & (spread_m > settings.head_width_m / 2)[piece]
-        unsure = unsure & (narrow & (spread_m <= settings.head_width_m / 2))[piece]
-    return np.where(partnered, narrow[piece], alone[piece]), sharp, rounded, unsure
+        unsure = unsure & narrow & (spread_m <= settings.head_width_m / 2)[piece]
+    return sharp, rounded, unsure
 
 
 def _are_flat(kept: Kept, chosen: np.ndarray, shown: Shown, head_width_m: float) -> np.ndarray:
@@ -442,30 +437,27 @@ def _are_flat(kept: Kept, chosen: np.ndarray, shown: Shown, head_width_m: float)
     return (dense & (level >= FLAT_SHARE * every))[piece]
 
 
-def _stands_alone(
-    kept: Kept,
-    piece: np.ndarray,
-    width_m: np.ndarray,
-    rails: np.ndarray,
-    shown: Shown,
-    settings: Settings,
-    tolerances: Tolerances,
-) -> np.ndarray:
-    """Return which pieces, of (pieces,) widths, may be rails without a partner, (pieces,) bool.
+def _are_rails(kept: Kept, beside: Near, shown: Shown, settings: Settings, tolerances: Tolerances) -> np.ndarray:
+    """Return which cells of narrow pieces belong to rails, (n,) bool: those with a partner, and some others.
 
-    They are as narrow as a head and no narrower, stand as high as a rail does that is not buried in ballast, or as the
-    rails that have a partner, (k,) heights, their bed is not steeper than a track's, the other rail may be hidden, and
-    they overhang.
+    Rails without a partner are as narrow as a head and no narrower, stand as high as a rail does that is not buried in
+    ballast, or as those that have a partner, their bed is not steeper than a track's, the other rail may be hidden, and
+    they overhang. `beside` has the points in the height of the heads, and the cells near them.
     """
+    partnered = with_partner(kept.pairs, kept.paired)
+    if partnered.all():
+        return partnered
+    piece = pieces_of(len(kept.cell), kept.pairs)
+    width_m, height_m = beside.widths(piece), mean_of(kept.lines.height, piece)
     narrow = width_m < settings.head_width_m + tolerances.wider_single_m
     narrow &= width_m >= SINGLE_WIDTH * settings.head_width_m
-    height_m = mean_of(kept.lines.height, piece)
     high = height_m >= SINGLE_HEIGHT_M
+    rails = kept.lines.height[partnered & (lengths(kept.lines.axis, piece) >= LEAST_SINGLE_M)[piece]]
     if len(rails):
         high |= np.abs(height_m - np.median(rails)) < AS_HIGH_M
     alone = narrow & high & (mean_of(shown.bed.slopes(kept.lines.axis), piece) <= SINGLE_SLOPE)
-    mine = alone[piece] & ~with_partner(kept.pairs, kept.paired)
+    mine = alone[piece] & ~partnered
     lines, (numbers, number) = kept.lines.of(mine), np.unique(piece[mine], return_inverse=True)
     hidden = may_hide_partner(lines, number, shown.tops, settings, tolerances.partner_m)
     alone[numbers] = hidden & ~are_solid(lines, number, shown.xy, shown.height, settings.head_width_m)
-    return alone
+    return partnered | alone[piece]

@@ -109,6 +109,16 @@ def test_a_lone_rail_stands_as_high_as_the_other_rails(height_m, kept):
     assert (found & ~bar).any()
 
 
+@pytest.mark.parametrize(("wide_m", "kept"), [(WIDTH, True), (0.14, False)])
+def test_a_bar_is_a_rail_only_with_a_partner_that_is_one(wide_m, kept):
+    """Both are lower than a rail without a partner may be, as the ends of sleepers and what lies between tracks are."""
+    rng = np.random.RandomState(24)
+    xyz, bar = with_bar(flat(10.0, rng=rng, per_m2=2500), WIDTH, 0.3, -SPACING / 2, 0.10)
+    xyz, _ = with_bar(xyz, wide_m, 0.3, SPACING / 2, 0.10)
+    found = classify_square(rough(xyz, rng, 0.005), SETTINGS).rail
+    assert found[bar & inner(xyz, 8)].any() == kept
+
+
 @pytest.mark.parametrize(("wide_m", "kept"), [(0.0, False), (0.04, False), (0.20, True)])
 def test_a_lone_bar_is_a_rail_where_something_may_hide_the_other_one(wide_m, kept):
     """Nothing is seen in a strip at gauge, which is as wide as a head, or narrower."""
