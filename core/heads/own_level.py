@@ -23,7 +23,8 @@ LEVELS = 3
 """Levels that are looked for in a bin: the head, what stands on it, and what is in between."""
 
 APART_M = 0.03
-"""Distance of two levels of a bin from which the points of one are not those of the other."""
+"""Distance of two levels of a bin from which the points of one are not those of the other. Where bins differ by as much
+by chance, they show no levels: where a scanner sees the face of a far head, five points of a bin are 40 mm apart."""
 
 MIN_POINTS = 3
 """Points that make a level: on the sparsest rails a bin has five."""
@@ -82,7 +83,8 @@ class _Levels:
 def on_own_level(points: HeadPoints) -> HeadPoints:
     """Choose the points that may be on the head by their height.
 
-    All points are, where the level of a line is not in doubt, or where beams blend heads with the ballast.
+    All points are, where the level of a line is not in doubt, or where beams blend heads with the ballast, or where few
+    points of a face are as far apart by chance as levels are.
     """
     t, head = points.t, points.within(0.5)
     occupied = len(np.unique((t[head] / LEVEL_BIN_M).astype(int)))
@@ -91,7 +93,10 @@ def on_own_level(points: HeadPoints) -> HeadPoints:
     number = (t / LEVEL_BIN_M).astype(int)
     flat = _flat(number, points.z, t, head)
     levels = _levels(number[head], flat[head])
-    step_m = _step(levels)
+    by_chance_m = _by_chance(levels)
+    if by_chance_m > APART_M:
+        return points
+    step_m = float(np.clip(by_chance_m, *STEP_M))
     chosen = _chain(_pieces(levels, step_m), step_m)
     if not len(chosen):
         return points
@@ -155,10 +160,10 @@ def _levels(number: np.ndarray, z: np.ndarray) -> _Levels:
     return _Levels(bins[order], heights[order])
 
 
-def _step(levels: _Levels) -> float:
-    """Return the change of level, metres, that chance does not explain; the fullest level of a bin is the first."""
+def _by_chance(levels: _Levels) -> float:
+    """Return the largest change of level, metres, that chance explains; the fullest level of a bin is the first."""
     first = np.flatnonzero(np.diff(levels.bin, prepend=-1))
-    return float(np.clip(STEP_SIGMAS * robust_sigma(np.diff(levels.height[first])), *STEP_M))
+    return STEP_SIGMAS * robust_sigma(np.diff(levels.height[first]))
 
 
 def _sagitta(bins: np.ndarray, known: np.ndarray) -> np.ndarray:

@@ -53,6 +53,14 @@ def test_a_rail_whose_level_drifts_is_not_a_vehicle_where_noise_breaks_it_into_p
     assert rail.mean() > 0.9
 
 
+def test_few_points_on_a_face_have_no_level():
+    """A far scanner sees some points of a crown, and most of a face that is 38 mm high."""
+    random = np.random.default_rng(1)
+    head = band(0, 100, 18, across=-0.03, half=0.004, noise=0.003, seed=1, profile=hilly)
+    head[:, 2] -= (random.random(len(head)) < 0.9) * random.uniform(0, 0.038, len(head))
+    assert own(head)[0].all()
+
+
 def test_weeds_are_not_on_the_level():
     random = np.random.default_rng(5)
     weeds = np.column_stack([random.uniform(0, 60, 40), random.uniform(-0.03, 0.03, 40), random.uniform(0.05, 0.1, 40)])
