@@ -215,8 +215,12 @@ class Ridge:
 
     @classmethod
     def find(cls, points: HeadPoints) -> Ridge | None:
-        """Fit one parabola, and a crest for each window, to points; None with too few, or if they are not blunt."""
+        """Fit one parabola, and a crest for each window, to points; None with too few, or if they are not blunt.
+
+        Next to another head, both are one ridge, whose crest is between them.
+        """
         near = points[points.within(REACH_HEADS)]
+        near = near[near.alone] if np.count_nonzero(near.alone) >= LEAST_ON_RIDGE else near
         if not points.is_blunt or len(near.t) < LEAST_ON_RIDGE:
             return None
         row, rows = near.station, len(near.stations)

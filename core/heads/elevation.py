@@ -18,12 +18,12 @@ from ..polyline import Polyline, project
 from ..progress import SILENT, Progress
 from ..rails import RailLine, Support
 from .axis import CELL_M, Axis, unseen_m
-from .head_points import HeadPoints, Widths, near_lines, stations_along
+from .head_points import STATION_STEP_M, HeadPoints, Widths, near_lines, stations_along
 from .level import rough_level
 from .own_level import on_own_level
 from .smoother import KNOT_M
 from .strips import StripOffsets, measure_strips
-from .top import MIN_POINTS, Top, by_outline, find_top, fit_crown, smoothed
+from .top import MIN_POINTS, Top, by_lone_ridge, by_outline, find_top, fit_crown, smoothed
 
 MIN_GAP_M, MAX_CHANCE_GAP_M = 0.5, 0.9
 """Length without points from which a line counts as bridged: five profiles of the fastest train's scanner. Where points
@@ -85,41 +85,58 @@ def elevate(
     numbered from 1 in order of their starts from west to east; those that are short or have no points are left out.
     """
     free_ends = (network.degrees() == 1)[network.ends]
-    rails = []
+    rails, shared_m = [], []
     for number, points in enumerate(progress.follow(near)):
         rail = _measured(points, free_ends[number], parameters, strips[number] if strips else None)
         if rail is not None and rail.length_m >= parameters.min_length_m:
             rails.append(replace(rail, class_code=class_code))
-    return numbered(begun_on_others(rails, parameters.tolerance_xy_m))
+            shared_m.append(shared_ends(points))
+    return numbered(begun_on_others(rails, parameters.tolerance_xy_m, shared_m))
 
 
-def begun_on_others(rails: Sequence[RailLine], reach_m: float) -> list[RailLine]:
+def begun_on_others(
+    rails: Sequence[RailLine], reach_m: float, shared_m: Sequence[tuple[float, float]] = ()
+) -> list[RailLine]:
     """Give ends that no points show the height of the rail on whose head they begin, within `reach_m` of it.
 
     A branch begins on its stock rail, on the same sleepers. Where points show neither blade nor frog, its heights would
-    be extrapolated for up to 10 m; the grade where its points begin stays as it is.
+    be extrapolated for up to 10 m; the grade where its points begin stays as it is. `shared_m` are the lengths of both
+    ends of each rail that points show as one with others; see `shared_ends`.
     """
     level = []
-    for rail in rails:
+    for number, rail in enumerate(rails):
         others = [other for other in rails if other is not rail]
-        for _ in range(2):
-            rail = _begun_on(others, rail, reach_m).reversed()
+        for ends_m in shared_m[number] if shared_m else (0.0, 0.0):
+            rail = _begun_on(others, rail, reach_m, ends_m).reversed()
         level.append(rail)
     return level
 
 
-def _begun_on(others: Sequence[RailLine], rail: RailLine, reach_m: float) -> RailLine:
-    """Give the start of a rail, if it is in a gap, the height of another rail there that has points."""
-    gap_m = rail.gaps[0, 1] if len(rail.gaps) and rail.gaps[0, 0] == 0 else 0.0
+def _begun_on(others: Sequence[RailLine], rail: RailLine, reach_m: float, shared_m: float) -> RailLine:
+    """Give the start of a rail, if it is in a gap or shared, the height of another rail there that has points."""
+    gap_m = max(rail.gaps[0, 1] if len(rail.gaps) and rail.gaps[0, 0] == 0 else 0.0, shared_m)
     feet = project([other.xyz[:, :2] for other in others if gap_m], rail.xyz[:1, :2], reach_m)
     if not len(feet.t):
         return rail
     other, (t,), along = others[feet.line[0]], feet.t, rail.line.t
-    if any(start <= t <= end for start, end in other.gaps):
+    if not shared_m and any(start <= t <= end for start, end in other.gaps):
         return rail
     above_m = np.interp(t, other.line.t, other.xyz[:, 2]) - rail.xyz[0, 2]
-    raised_m = above_m * np.maximum(1 - along / gap_m, 0.0) ** 2
+    way = np.minimum(along / gap_m, 1.0)
+    # A ridge of both is about as high up to where they part; a gap is extrapolated, the further the worse.
+    raised_m = above_m * (1 - way**2 if shared_m else (1 - way) ** 2)
     return replace(rail, xyz=rail.xyz + raised_m[:, None] * [0.0, 0.0, 1.0])
+
+
+def shared_ends(points: HeadPoints) -> tuple[float, float]:
+    """Return the lengths at both ends of a line over which its ridge is one with those of other heads, metres.
+
+    Sharp heads are as high beside others as alone.
+    """
+    alone = np.flatnonzero(points.free.all(axis=0))
+    if not points.is_blunt or not len(alone):
+        return 0.0, 0.0
+    return float(STATION_STEP_M * alone[0]), float(STATION_STEP_M * (points.free.shape[1] - 1 - alone[-1]))
 
 
 def flat_rails(network: LineNetwork, class_code: int, parameters: ElevationParameters) -> tuple[RailLine, ...]:
@@ -183,7 +200,9 @@ def _top_of(points: HeadPoints, axis: Axis, parameters: ElevationParameters) -> 
     if top is None:
         return None
     top = replace(top, crown_m=crown.error(points.width_m))
-    return top if smoothing_m is not None or axis.ridge else by_outline(top, axis.shown.outline)
+    if axis.ridge:
+        return by_lone_ridge(top, smoothing_m, prior)
+    return top if smoothing_m is not None else by_outline(top, axis.shown.outline)
 
 
 def measure_again(

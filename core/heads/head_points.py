@@ -39,6 +39,10 @@ The edges stay sharp to 3 mm."""
 BESIDE_HEADS = 1.5
 """Distance of two axes, in head widths, from which the ground between the heads is wide enough to show their edges."""
 
+BESIDE_BLUNT_HEADS = 3.0
+"""The same where heads are blunt: ridges of two heads that are blurred by 6 cm are one up to 0.2 m, higher than either
+alone."""
+
 CROSSED_M = 0.01
 """Offset on both sides of a line from which another line crosses it; less may be the error of the lines."""
 
@@ -76,6 +80,9 @@ SHOULDER_SHARE = 0.2
 ASIDE_HEADS, ASIDE_PLACES = 0.6, 25
 """Distance from a line, in head widths, within which the crest of a strip is looked for, 4 cm by which surveys may be
 registered apart; and places at which it is, 4 mm from each other."""
+
+NO_EDGES = np.ones((2, 0), dtype=bool)
+"""Edges of a line before it is known how far other heads disturb them."""
 
 Widths = Union[float, np.ndarray]
 """Width of the heads of all lines, or of each line, (n,) metres."""
@@ -146,6 +153,11 @@ class HeadPoints:
     def per_station(self, values: np.ndarray | None = None) -> np.ndarray:
         """Count the points next to each station, or sum up values of theirs, (n,): (s,)."""
         return np.bincount(self.station, values, len(self.stations))
+
+    @property
+    def alone(self) -> np.ndarray:
+        """Which points are where no other head disturbs either edge, (n,) bool."""
+        return (self.free[0] & self.free[1])[self.station]
 
     def within(self, share: float) -> np.ndarray:
         """Return which points are this close to the line, in head widths, (n,) bool."""
@@ -239,15 +251,15 @@ def near_lines(
     If it is not known whether the cloud blunts heads, these lines show it.
     """
     feet = project(lines, xyz[:, :2], HALF_RANGE_BINS / (2 * HALF_HEAD_BINS) * widest(widths), progress)
-    free = free_edges(lines, widest(widths))
     z, own = xyz[feet.point, 2], None if strips is None else strips[feet.point]
     heads = []
     for number, width_m in enumerate(np.broadcast_to(widths, len(lines)).tolist()):
         mine = slice(*np.searchsorted(feet.line, [number, number + 1]))
         strip = None if own is None else own[mine]
-        heads.append(HeadPoints(feet.t[mine], feet.across[mine], z[mine], width_m, lines[number], free[number], strip))
+        heads.append(HeadPoints(feet.t[mine], feet.across[mine], z[mine], width_m, lines[number], NO_EDGES, strip))
     is_blunt = _are_blunt(heads) if blunt is None else blunt
-    return [replace(head, is_blunt=is_blunt) for head in heads]
+    free = free_edges(lines, widest(widths), BESIDE_BLUNT_HEADS if is_blunt else BESIDE_HEADS)
+    return [replace(head, is_blunt=is_blunt, free=own) for head, own in zip(heads, free)]
 
 
 def judged(points: RailPoints, lines: Sequence[np.ndarray], widths: Widths) -> RailPoints:
@@ -297,13 +309,17 @@ def _are_blunt(heads: Sequence[HeadPoints]) -> bool:
     return bool(blunt_m > sharp_m)
 
 
-def free_edges(lines: Sequence[np.ndarray], head_width_m: float) -> list[np.ndarray]:
+def free_edges(
+    lines: Sequence[np.ndarray], head_width_m: float, beside_heads: float = BESIDE_HEADS
+) -> list[np.ndarray]:
     """Return where the right and the left edge of each head are free of other heads, (2, s) at the line's stations.
+
+    Axes that are `beside_heads` apart, in head widths, do not disturb each other.
 
     Where a branch leaves its stock rail the heads overlap, and only the outer edge of each is free.
     """
     free = [np.ones((2, len(stations_along(Polyline(line).length_m))), dtype=bool) for line in lines]
-    for line, station, across in _close_runs(lines, BESIDE_HEADS * head_width_m):
+    for line, station, across in _close_runs(lines, beside_heads * head_width_m):
         crossing = across.min() < -CROSSED_M and across.max() > CROSSED_M
         side = across if crossing else np.full(len(across), across.sum())
         overlap = crossing & (np.abs(across) < 0.5 * head_width_m)

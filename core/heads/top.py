@@ -145,6 +145,22 @@ def by_outline(top: Top, outline: Middles) -> Top:
     return replace(top, course=course, crown_m=np.interp(stations, t, course.followed(t, common_m, information[known])))
 
 
+def by_lone_ridge(top: Top, smoothing_m: float | None, prior: Prior) -> Top:
+    """Take the height that a ridge shows where no other head is next to it: both are one ridge there, which is higher.
+
+    An end that other heads are next to keeps what it shows.
+    """
+    alone = np.flatnonzero(top.points.alone)
+    if not len(alone) or len(alone) == len(top.points.t):
+        return top
+    inner = np.arange(len(top.points.t))
+    chosen = top.points.within(AXIS_SHARE) & (top.points.alone | (inner < alone[0]) | (inner > alone[-1]))
+    if chosen.sum() < MIN_POINTS:
+        return top
+    points, slope = top.points[chosen], top.slope[chosen]
+    return replace(top, course=smoothed(points.t, points.z - slope * points.across, smoothing_m, prior))
+
+
 def fit_crown(points: HeadPoints) -> Crown:
     """Fit a parabola to the crown of a head.
 

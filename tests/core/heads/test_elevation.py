@@ -156,6 +156,22 @@ def test_a_branch_begins_at_the_height_of_its_stock_rail(reverse):
     assert height == pytest.approx([0.0, 0.002, -0.07], abs=0.002)
 
 
+def test_ridges_of_a_branch_and_its_stock_rail_that_are_one_do_not_lift_either():
+    """Blurred by 6 cm, two heads that are nearer than 0.2 m are one ridge, up to twice as high as either."""
+    stock, way = straight_line(60), np.arange(0, 40.05, 0.1)
+    branch = np.column_stack([20 + way, way**2 / 380])
+    rng = np.random.default_rng(4)
+    x, y = rng.uniform(0, 60, 40000), rng.uniform(-0.3, 4.5, 40000)
+    away = np.where(x > 20, y - np.maximum(x - 20, 0) ** 2 / 380, np.inf)
+    near = (np.abs(y) < 0.12) | (np.abs(away) < 0.12)
+    up = 0.1 * np.exp(-0.5 * (y / 0.06) ** 2) + 0.1 * np.exp(-0.5 * (away / 0.06) ** 2) + rng.normal(0, 0.004, len(x))
+    points = cloud_of(np.column_stack([x, y, up])[near])
+    ends, passes = np.array([[0, 1], [2, 3]]), np.array([[2, 0, 200]])
+    nodes = np.array([stock[0], stock[-1], branch[0], branch[-1]])
+    for rail in elevated(LineNetwork((stock, branch), nodes, ends, passes), points):
+        assert np.abs(rail.xyz[:, 2] - 0.1).max() < 0.02
+
+
 def test_lines_are_directed_and_numbered_and_have_their_class():
     lines = [straight_line(20)[::-1] + [30.0, 0.0], straight_line(20), straight_line(20)[:, ::-1] + [5.0, 10.0]]
     east = head(20, 80)
