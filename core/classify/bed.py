@@ -137,12 +137,13 @@ class Bed:
             height[chosen[nearer]], level[chosen[nearer]] = other[nearer], number
         return height, level
 
-    def slopes(self, xy: np.ndarray) -> np.ndarray:
-        """Return the slope of the flattest level at places, (k, 2): height per length, (k,); 0 where there is none."""
+    def gradients(self, xy: np.ndarray) -> np.ndarray:
+        """Return the slopes of the flattest level at places, (k, 2), to east and north, (k, 2); 0 where there is none."""
         cell, inside = self.coarse.cells(xy)
-        slope = np.hypot(self.planes[:, 1, cell], self.planes[:, 2, cell])
-        slope = np.where(inside & np.isfinite(slope), slope, np.inf).min(axis=0)
-        return np.where(np.isfinite(slope), slope, 0.0)
+        slopes = np.where(inside, self.planes[:, 1:, cell], np.nan)
+        steep = np.hypot(*slopes.transpose(1, 0, 2))
+        flattest = np.where(np.isfinite(steep), steep, np.inf).argmin(axis=0)
+        return np.nan_to_num(slopes[flattest, :, np.arange(len(xy))])
 
 
 def find_bed(coarse: Coarse, dx: np.ndarray, dy: np.ndarray, z: np.ndarray) -> Bed:

@@ -145,8 +145,11 @@ def shares_of_length(lines: Lines, half_m: float) -> np.ndarray:
     return share_m
 
 
-def stands_free(tops: Tops, band: Band, marks: np.ndarray, lines: Lines) -> np.ndarray:
-    """Return which lines of cells, `marks`, have lower ground, or nothing seen, on each side, (n,) bool."""
+def stands_free(tops: Tops, band: Band, marks: np.ndarray, lines: Lines, slope: np.ndarray) -> np.ndarray:
+    """Return which lines of cells, `marks`, have lower ground, or nothing seen, on each side, (n,) bool.
+
+    Lower than a plane through the line, that is, with this `slope` to the left, (n,), height per length.
+    """
     along = np.linspace(-0.5, 0.5, ALONG) * lines.reach_m
     free = np.ones(len(lines.axis), dtype=bool)
     depth_m = band.depth_m(lines.height)
@@ -158,7 +161,7 @@ def stands_free(tops: Tops, band: Band, marks: np.ndarray, lines: Lines) -> np.n
             seen, high = np.zeros(len(free), dtype=np.int64), np.zeros(len(free), dtype=np.int64)
             for ahead in along:
                 cell, inside = tops.grid.cells(lines.axis + ahead * ahead_m + side * left * left_m)
-                rise = z[cell] - own
+                rise = z[cell] - own - side * left * slope
                 wall = inside & high_cells[cell]
                 seen += wall | (inside & (np.abs(rise) < HIGH_M))
                 high += wall | (inside & (rise >= -depth_m) & (rise < HIGH_M))

@@ -61,6 +61,9 @@ SHARP_WIDER_M = 0.016
 cloud and more: up to 11 mm by scanners on vehicles, 13 mm by wide beams from the air, and from 20 mm on in images that
 blur by 3 cm, where a wider limit kept one rail and dropped the next."""
 
+CANT = 0.12
+"""Steepest slope of a track across, height per length: 180 mm over 1.5 m."""
+
 NOISE_ACROSS_M = 0.01
 """Largest distance beyond the side of a head at which the top of a cell counts towards its axis. With half the gap to
 a guard rail, the axis would lie between both rails."""
@@ -215,7 +218,7 @@ def _standing(shown: Shown, settings: Settings) -> Standing:
     if thin and band.shadows:  # few points fill a strip by chance
         found = Candidates.find(shown, replace(band, shadows=False))
     tolerances = settings.tolerances(thin)
-    kept = _kept(found, reach_at(density), tolerances, settings)
+    kept = _kept(found, shown.bed, reach_at(density), tolerances, settings)
     if settings.blunt:
         return _on_ridges(kept, thin, shown, settings)
     return _on_bars(kept, thin, found, shown, settings, tolerances)
@@ -340,16 +343,17 @@ def _density(coarse: Coarse, xy: np.ndarray) -> float:
     return float(np.quantile(counts, DENSITY_QUANTILE)) / COARSE_M**2 if len(counts) else np.inf
 
 
-def _kept(found: Candidates, reach_m: float, tolerances: Tolerances, settings: Settings) -> Kept:
+def _kept(found: Candidates, bed: Bed, reach_m: float, tolerances: Tolerances, settings: Settings) -> Kept:
     """Keep the candidates that lie on rails."""
     lines = find_lines(found.at(found.marks), reach_m, tolerances.along_m, tolerances.beside_line_m)
     good = lines.good()
     half_m = settings.head_width_m / 2 + NOISE_ACROSS_M
     lines = centred(lines.of(good), found.at(found.cells), half_m, tolerances.along_m)
-    free = stands_free(found.tops, tolerances.band, found.marks[good], lines)
+    cant = np.einsum("ij,ij->i", bed.gradients(lines.axis), lines.across).clip(-CANT, CANT)
+    free, level = (stands_free(found.tops, tolerances.band, found.marks[good], lines, one) for one in (cant, 0 * cant))
     lines, marks = lines.of(free), found.marks[good[free]]
     paired, pairs = _paired(lines, settings, tolerances), links(lines)
-    kept = Kept(lines, marks, paired, pairs).of(_certain(lines, paired, pairs))
+    kept = Kept(lines, marks, paired, pairs).of(_certain(lines, paired, pairs) & (paired | level[free]))
     inside = runs_inside(kept.lines, kept.paired, kept.pairs, settings.gauges_m, settings.head_width_m)
     kept = kept.of(~inside)
     kept = kept.of(~lower_than_beside(kept.lines, tolerances.spread_m))
@@ -455,7 +459,8 @@ def _are_rails(kept: Kept, beside: Near, shown: Shown, settings: Settings, toler
     rails = kept.lines.height[partnered & (lengths(kept.lines.axis, piece) >= LEAST_SINGLE_M)[piece]]
     if len(rails):
         high |= np.abs(height_m - np.median(rails)) < AS_HIGH_M
-    alone = narrow & high & (mean_of(shown.bed.slopes(kept.lines.axis), piece) <= SINGLE_SLOPE)
+    slope = np.hypot(*shown.bed.gradients(kept.lines.axis).T)
+    alone = narrow & high & (mean_of(slope, piece) <= SINGLE_SLOPE)
     mine = alone[piece] & ~partnered
     lines, (numbers, number) = kept.lines.of(mine), np.unique(piece[mine], return_inverse=True)
     hidden = may_hide_partner(lines, number, shown.tops, settings, tolerances.partner_m)

@@ -23,8 +23,7 @@ LEVELS = 3
 """Levels that are looked for in a bin: the head, what stands on it, and what is in between."""
 
 APART_M = 0.03
-"""Distance of two levels of a bin from which the points of one are not those of the other. Where bins differ by as much
-by chance, they show no levels: where a scanner sees the face of a far head, five points of a bin are 40 mm apart."""
+"""Distance of two levels of a bin from which the points of one are not those of the other."""
 
 MIN_POINTS = 3
 """Points that make a level: on the sparsest rails a bin has five."""
@@ -36,6 +35,10 @@ noise alone makes steps, and a line would lose its ends."""
 STEP_M, STEP_SIGMAS = (0.008, 0.015), 4.0
 """Largest change of the level beyond the gradient, between these limits, in standard deviations of what bins show by
 chance: dirt in a flangeway is 10 to 50 mm below the top."""
+
+SEVERAL_SHARE = 0.25
+"""Share of the bins with a second level from which more than chance makes them differ: 0.8 to 1.0 where half of the
+points are ballast, 0.01 in a wide beam from the air."""
 
 SAGITTA = 5e-5
 """Sagitta of a rail's profile, metres, per product of the distances from both ends, m²: half the curvature of waves of
@@ -83,8 +86,9 @@ class _Levels:
 def on_own_level(points: HeadPoints) -> HeadPoints:
     """Choose the points that may be on the head by their height.
 
-    All points are, where the level of a line is not in doubt, or where beams blend heads with the ballast, or where few
-    points of a face are as far apart by chance as levels are.
+    All points are, where the level of a line is not in doubt, or where beams blend heads with the ballast, or where
+    bins have one level each that differs by chance: few points of a far head's face are 40 mm apart, and points from the
+    air scatter as much.
     """
     t, head = points.t, points.within(0.5)
     occupied = len(np.unique((t[head] / LEVEL_BIN_M).astype(int)))
@@ -94,7 +98,7 @@ def on_own_level(points: HeadPoints) -> HeadPoints:
     flat = _flat(number, points.z, t, head)
     levels = _levels(number[head], flat[head])
     by_chance_m = _by_chance(levels)
-    if by_chance_m > APART_M:
+    if by_chance_m > STEP_M[1] and len(levels.bin) < (1 + SEVERAL_SHARE) * len(np.unique(levels.bin)):
         return points
     step_m = float(np.clip(by_chance_m, *STEP_M))
     chosen = _chain(_pieces(levels, step_m), step_m)

@@ -58,5 +58,5 @@ def test_the_slope_of_the_flattest_level_is_stated():
     x, y, z = xyz.T
     coarse = Coarse.around(x, y)
     bed = find_bed(coarse, *coarse.offsets(x, y), z.astype(np.float32))
-    slopes = bed.slopes(np.array([[2.2, 4.2], [2.2, 0.3], [50.0, 50.0]]))
-    np.testing.assert_allclose(slopes, [0.5, 0.1, 0.0], atol=0.03)
+    gradients = bed.gradients(np.array([[2.2, 4.2], [2.2, 0.3], [50.0, 50.0]]))
+    np.testing.assert_allclose(gradients, [[0.5, 0.0], [0.1, 0.0], [0.0, 0.0]], atol=0.03)

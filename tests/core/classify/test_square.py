@@ -86,6 +86,16 @@ def test_a_rail_beside_a_shoulder_has_its_partner():
     assert figures.paired_m > 0.9 * (figures.paired_m + figures.single_m) > 9
 
 
+def test_rails_of_a_canted_track_in_ballast_up_to_the_heads_are_labelled():
+    """On the higher side of each rail the bed rises to its top."""
+    rng = np.random.RandomState(18)
+    xyz, on = with_track(flat(12.0, rng=rng, per_m2=4000), GAUGE, WIDTH, 0.3)
+    xyz[:, 2] = np.where(on, 0.06, rng.normal(0, 0.005, len(xyz))) + 0.115 * turned(xyz, 0.3)[1]
+    found = classify_square(xyz, SETTINGS).rail
+    assert (found & on)[inner(xyz, 10)].sum() / on[inner(xyz, 10)].sum() > 0.95
+    assert (found & on).sum() / found.sum() > 0.95
+
+
 def test_ballast_up_to_the_heads_does_not_widen_them():
     rng = np.random.RandomState(16)
     xyz, on = ballasted(rng, per_m2=4000)

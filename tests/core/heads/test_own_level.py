@@ -61,6 +61,11 @@ def test_few_points_on_a_face_have_no_level():
     assert own(head)[0].all()
 
 
+def test_a_rail_seen_from_the_air_keeps_its_points_where_noise_alone_makes_steps():
+    (rail,) = own(band(0, 100, 12, noise=0.016, profile=lambda t: 0.05 * np.sin(2 * np.pi * t / 70)))
+    assert rail.mean() > 0.9
+
+
 def test_weeds_are_not_on_the_level():
     random = np.random.default_rng(5)
     weeds = np.column_stack([random.uniform(0, 60, 40), random.uniform(-0.03, 0.03, 40), random.uniform(0.05, 0.1, 40)])
