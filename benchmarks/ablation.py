@@ -120,7 +120,7 @@ SWITCHES = (
     _rule("tracks.parallels._is_crowded", none_of),
     _rule("checks.warnings._off_level_m", lambda *_: 0.0),
     _rule("checks.doubts.find_jumps", nothing),
-    _rule("classify.square.stands_free", lambda tops, band, marks, lines: all_of(lines)),
+    _rule("classify.square.stands_free", lambda tops, band, marks, lines, slope: all_of(lines)),
     _rule("classify.square.runs_inside", none_of),
     _rule("classify.square.lower_than_beside", none_of),
     _rule("classify.square.centred", first),

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.ndimage import binary_dilation
+from scipy.ndimage import binary_dilation, binary_propagation
 from scipy.sparse import csr_matrix
 from scipy.spatial import cKDTree
 
@@ -19,10 +19,10 @@ from .pieces import lengths, links, pieces_of
 from .settings import Settings
 from .tops import TENTHS_OF_MM, Grid, centroids
 
-MIN_PER_M2 = 500.0
+MIN_PER_M2, FAR_PER_M2 = 500.0, 300.0
 """Least points per square metre of a pavement that shows grooves: they are 45 mm apart then, and each groove of 42 mm
 holds most of a row of them. Between points that are further apart, as those of images are, a groove and a wave of the
-pavement look alike."""
+pavement look alike. Far from the scanner, the rest of the same pavement shows them from the second number on."""
 
 MIN_SHARE, LEVEL_M, NEAR_BED_M = 0.65, 0.008, 0.03
 """A coarse cell is paved if this share of its points is this close to their mean height; the mean is that of the
@@ -140,8 +140,10 @@ def _pavement(shape: tuple[int, int], points: NearBed) -> np.ndarray:
     mean = np.bincount(own, tenths, cells) / np.maximum(np.bincount(own, minlength=cells), 1)
     flat = np.bincount(own[np.abs(tenths - mean[own]) < LEVEL_M * TENTHS_OF_MM], minlength=cells)
     count = np.bincount(number, minlength=cells)
-    paved = (count > MIN_PER_M2 * COARSE_M**2) & (flat > MIN_SHARE * count)
-    grown = binary_dilation(paved.reshape(MAX_LEVELS, *shape), np.ones((1, 3, 3))).ravel()
+    paved = (count > FAR_PER_M2 * COARSE_M**2) & (flat > MIN_SHARE * count)
+    paved, dense = (one.reshape(MAX_LEVELS, *shape) for one in (paved, paved & (count > MIN_PER_M2 * COARSE_M**2)))
+    around = np.ones((1, 3, 3), dtype=bool)
+    grown = binary_dilation(binary_propagation(dense, around, paved), around).ravel()
     return np.where(grown, mean / TENTHS_OF_MM, np.nan)[number]
 
 

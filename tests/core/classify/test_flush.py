@@ -64,6 +64,18 @@ def test_grooves_are_found_as_far_from_the_scanner_as_they_hold_a_row_of_points(
     assert (found & on[few] & here).sum() / (on[few] & here).sum() > 0.9
 
 
+@pytest.mark.parametrize(("near", "found"), [(0.10, True), (0.035, False)])
+def test_a_far_rail_is_found_in_the_thinner_rest_of_a_pavement(near, found):
+    """The far half of the street has 350 points per square metre, the near one 1000, or as few."""
+    xyz, on, _ = street(0.003)
+    share = np.where(turned(xyz, 0.3)[1] < -0.2, near, 0.035)
+    few = np.random.RandomState(3).random_sample(len(xyz)) < share
+    along, across = turned(xyz[few], 0.3)
+    far = on[few] & (np.abs(along) < 3) & (across > 0)
+    labelled = classify_square(xyz[few], SETTINGS).rail
+    assert (labelled[far].mean() > 0.9) if found else not labelled.any()
+
+
 def test_the_side_of_a_vehicle_at_gauge_from_a_groove_is_no_rail():
     """Its points, from 0.75 m up, have a level of their own, and the lowest lie below it as those of a groove do."""
     xyz, _, inside = street(0.003, angle=0.0)
