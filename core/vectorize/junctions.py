@@ -6,6 +6,7 @@ See docs/method.md section 4.6.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -40,9 +41,9 @@ KINK_DEG, KINK_STEP_M = 25.0, 0.5
 
 
 def clean_junctions(network: LineNetwork, head_width_m: float) -> LineNetwork:
-    """Drop spurs and rungs between rails, and join lines at nodes of degree 2."""
-    network = weld_pairs(drop_rungs(weld_pairs(network), RUNG_HEADS * head_width_m))
-    return drop_spurs(network, SPUR_M)
+    """Drop spurs, loops and rungs between rails, and join lines at nodes of degree 2."""
+    network = drop_loops(drop_rungs(weld_pairs(network), RUNG_HEADS * head_width_m), SPUR_M)
+    return drop_spurs(weld_pairs(network), SPUR_M)
 
 
 def weld_pairs(network: LineNetwork) -> LineNetwork:
@@ -91,6 +92,18 @@ def drop_rungs(network: LineNetwork, length_m: float) -> LineNetwork:
             steep &= bool(deflections(network, others)[0, 1:].min() > RUNG_DEG)
         keep[line] = not steep
     return network.select(keep)
+
+
+def drop_loops(network: LineNetwork, length_m: float) -> LineNetwork:
+    """Draw one straight line for two between the same two nodes that are shorter than `length_m`: one rail with a hole."""
+    lines, keep = list(network.lines), np.ones(len(network.lines), dtype=bool)
+    between: dict[tuple[int, ...], int] = {}
+    for number in np.flatnonzero(network.lengths() < length_m).tolist():
+        ends = network.ends[number].tolist()
+        first = between.setdefault(tuple(sorted(ends)), number)
+        if first != number and ends[0] != ends[1]:
+            lines[first], keep[number] = network.nodes[network.ends[first]], False
+    return replace(network, lines=tuple(lines)).select(keep)
 
 
 def run_through(network: LineNetwork) -> LineNetwork:
