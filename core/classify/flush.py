@@ -183,7 +183,7 @@ def _at_edge(grooves: Heads, xy: np.ndarray, head_width_m: float) -> Heads:
     """
     if not len(grooves.inward) or not len(xy):
         return grooves.of(np.zeros(len(grooves.inward), dtype=bool))
-    edge_m = _outer_edges(_summed_along(grooves, _level_counts(grooves, xy)))
+    edge_m = _outer_edges(_summed_along(grooves, _level_counts(grooves, xy)), head_width_m)
     seen = np.isfinite(edge_m)
     return grooves.of(seen).moved(edge_m[seen] - head_width_m / 2)
 
@@ -212,15 +212,19 @@ def _summed_along(grooves: Heads, counts: np.ndarray) -> np.ndarray:
     return csr_matrix((np.ones(len(rows)), (rows, columns)), shape=(len(axis), len(axis))) @ counts
 
 
-def _outer_edges(counts: np.ndarray) -> np.ndarray:
-    """Distance inwards at which the gap that is nearest to the middle begins, (n,) metres; NaN where there is none."""
+def _outer_edges(counts: np.ndarray, head_width_m: float) -> np.ndarray:
+    """Distance inwards at which the gap that is nearest to the middle begins, (n,) metres; NaN where there is none.
+
+    Nor is there one where less than half of a head beside it is level: at the foot of a wall, or of a slope.
+    """
     limit = GAP_SHARE * np.quantile(counts, LEVEL_QUANTILE, axis=1)[:, None]
     level, number, middle = counts >= np.maximum(limit, 1), np.arange(BINS), BINS // 2
     far = np.where(level, BINS, np.abs(number - middle))
     gap = np.argmin(far, axis=1)
     head = np.max(np.where(level & (number < gap[:, None]), number, -1), axis=1)
     rows = np.arange(len(counts))
-    found = (far[rows, gap] <= SEARCH_BINS) & (head >= 0)
+    on_head = (number <= head[:, None]) & (number > head[:, None] - head_width_m / BIN_M)
+    found = (far[rows, gap] <= SEARCH_BINS) & (2 * (level & on_head).sum(axis=1) > on_head.sum(axis=1))
     high, low = counts[rows, head], counts[rows, np.minimum(head + 1, BINS - 1)]
     share = (high - limit[:, 0]) / np.maximum(high - low, 1)
     return np.where(found, (head - middle + 0.5 + share) * BIN_M, np.nan)

@@ -349,7 +349,8 @@ def _kept(found: Candidates, bed: Bed, reach_m: float, tolerances: Tolerances, s
     good = lines.good()
     half_m = settings.head_width_m / 2 + NOISE_ACROSS_M
     lines = centred(lines.of(good), found.at(found.cells), half_m, tolerances.along_m)
-    cant = np.einsum("ij,ij->i", bed.gradients(lines.axis), lines.across).clip(-CANT, CANT)
+    cant = np.einsum("ij,ij->i", bed.gradients(lines.axis), lines.across)
+    cant[np.abs(cant) > CANT] = 0.0
     free, level = (stands_free(found.tops, tolerances.band, found.marks[good], lines, one) for one in (cant, 0 * cant))
     lines, marks = lines.of(free), found.marks[good[free]]
     paired, pairs = _paired(lines, settings, tolerances), links(lines)

@@ -76,6 +76,15 @@ def test_a_far_rail_is_found_in_the_thinner_rest_of_a_pavement(near, found):
     assert (labelled[far].mean() > 0.9) if found else not labelled.any()
 
 
+def test_hollows_at_the_feet_of_two_walls_are_not_grooves():
+    xyz, _, inside = street(0.003)
+    rng = np.random.RandomState(6)
+    outside = inside < 0
+    xyz[outside, 2] += rng.uniform(0.0, 0.75, outside.sum())
+    wall = outside & (inside > -0.012) | ~outside
+    assert not classify_square(xyz[wall], SETTINGS).rail.any()
+
+
 def test_the_side_of_a_vehicle_at_gauge_from_a_groove_is_no_rail():
     """Its points, from 0.75 m up, have a level of their own, and the lowest lie below it as those of a groove do."""
     xyz, _, inside = street(0.003, angle=0.0)
