@@ -138,7 +138,7 @@ class Bed:
         return height, level
 
     def gradients(self, xy: np.ndarray) -> np.ndarray:
-        """Return the slopes of the flattest level at places, (k, 2), to east and north, (k, 2); 0 where there is none."""
+        """Return the slopes to east and north of the flattest level at (k, 2) places, (k, 2); 0 where there is none."""
         cell, inside = self.coarse.cells(xy)
         slopes = np.where(inside, self.planes[:, 1:, cell], np.nan)
         steep = np.hypot(*slopes.transpose(1, 0, 2))

@@ -86,9 +86,9 @@ class _Levels:
 def on_own_level(points: HeadPoints) -> HeadPoints:
     """Choose the points that may be on the head by their height.
 
-    All points are, where the level of a line is not in doubt, or where beams blend heads with the ballast, or where
-    bins have one level each that differs by chance: few points of a far head's face are 40 mm apart, and points from the
-    air scatter as much.
+    All points are, where the level of a line is not in doubt, where beams blend heads with the ballast, or where bins
+    have one level each that differs by chance: few points of a far head's face are 40 mm apart, and points from the air
+    scatter as much.
     """
     t, head = points.t, points.within(0.5)
     occupied = len(np.unique((t[head] / LEVEL_BIN_M).astype(int)))

@@ -95,7 +95,7 @@ def drop_rungs(network: LineNetwork, length_m: float) -> LineNetwork:
 
 
 def drop_loops(network: LineNetwork, length_m: float) -> LineNetwork:
-    """Draw one straight line for two between the same two nodes that are shorter than `length_m`: one rail with a hole."""
+    """Draw one straight line for two shorter than `length_m` between the same two nodes: one rail with a hole."""
     lines, keep = list(network.lines), np.ones(len(network.lines), dtype=bool)
     between: dict[tuple[int, ...], int] = {}
     for number in np.flatnonzero(network.lengths() < length_m).tolist():
