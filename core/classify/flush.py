@@ -132,7 +132,7 @@ def _pavement(shape: tuple[int, int], points: NearBed) -> np.ndarray:
 
     Walls and the sides of vehicles have levels of their own, which have no grooves.
     """
-    number = points.level * np.int64(shape[0] * shape[1]) + points.coarse
+    number = points.level.astype(np.int64) * (shape[0] * shape[1]) + points.coarse
     cells = MAX_LEVELS * shape[0] * shape[1]
     near = np.abs(points.height) < NEAR_BED_M
     # Whole numbers add up to the same sum in any order of the points.

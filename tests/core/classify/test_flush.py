@@ -32,6 +32,13 @@ def test_heads_beside_grooves_are_labelled(angle):
     assert found.figures.paved == 1
 
 
+def test_a_building_of_many_floors_is_searched():
+    """Its coarse cells, counted over all floors, are more than 16 bits hold."""
+    floor = flat(60.0, rng=np.random.RandomState(1), per_m2=10)
+    floors = np.concatenate([floor + [0.0, 0.0, up] for up in (0.0, 4.0, 8.0, 12.0)])
+    assert not classify_square(floors, SETTINGS).rail.any()
+
+
 def test_noise_hides_the_grooves():
     xyz, _, _ = street(0.012)
     found = classify_square(xyz, SETTINGS)
