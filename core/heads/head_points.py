@@ -65,10 +65,11 @@ BLENDED_M = 0.006
 do. Seen by narrow beams, the round corners fall by 1 to 2 mm, and the rim of a line that is off the head by more, but
 not both."""
 
-FACE_SPREADS, FACE_SHARE = 2.5, 0.6
-"""Spread of the heights on a rim, in spreads on the crown and as a share of the fall, above which they are on the
-upright face of a sharp head. On a rim of each head that tripods on either side of a track saw, it was 2.8 to 9 times as
-large and 0.8 to 1.3 times the fall; blended by the beams of drones and by images, 0.8 to 2.2 times as large."""
+FACE_SPREADS, FACE_SHARES = 2.5, (0.6, 1.5)
+"""Least spread of the heights on a rim, in spreads on the crown, and its limits as shares of the fall, between which
+they are on the upright face of a sharp head. On a rim of each head that tripods on either side of a track saw, it was
+2.8 to 9 times as large and 0.8 to 1.3 times the fall; blended by the beams of drones and by images, 0.8 to 2.2 times,
+and beside the crest of such a ridge more than 1.8 times the fall."""
 
 CROWN_HEADS, RIM_HEADS, SHOULDER_HEADS = 0.2, (0.3, 0.5), (0.55, 0.75)
 """Parts of the head width on either side of the axis: the crown, the rims, and what is beyond a head that is not
@@ -299,7 +300,8 @@ def lengths_by_kind(heads: Sequence[HeadPoints]) -> np.ndarray:
 def _fall(crown: np.ndarray, rim: np.ndarray) -> float:
     """Return by how much heights on a rim are below those on the crown, metres; 0 where they are on a face."""
     fall_m, spread_m = float(np.median(crown) - np.median(rim)), robust_sigma(rim)
-    is_face = spread_m > max(FACE_SPREADS * robust_sigma(crown), FACE_SHARE * fall_m)
+    low, high = FACE_SHARES
+    is_face = spread_m > FACE_SPREADS * robust_sigma(crown) and low * fall_m < spread_m < high * fall_m
     return 0.0 if is_face else fall_m
 
 
