@@ -351,10 +351,12 @@ def _kept(found: Candidates, bed: Bed, reach_m: float, tolerances: Tolerances, s
     lines = centred(lines.of(good), found.at(found.cells), half_m, tolerances.along_m)
     cant = np.einsum("ij,ij->i", bed.gradients(lines.axis), lines.across)
     cant[np.abs(cant) > CANT] = 0.0
-    free, level = (stands_free(found.tops, tolerances.band, found.marks[good], lines, one) for one in (cant, 0 * cant))
+    free = stands_free(found.tops, tolerances.band, found.marks[good], lines, cant)
     lines, marks = lines.of(free), found.marks[good[free]]
     paired, pairs = _paired(lines, settings, tolerances), links(lines)
-    kept = Kept(lines, marks, paired, pairs).of(_certain(lines, paired, pairs) & (paired | level[free]))
+    alone, free = np.flatnonzero(~paired), paired.copy()  # only a track is canted
+    free[alone] = stands_free(found.tops, tolerances.band, marks[alone], lines.of(alone), np.zeros(len(alone)))
+    kept = Kept(lines, marks, paired, pairs).of(_certain(lines, paired, pairs) & free)
     inside = runs_inside(kept.lines, kept.paired, kept.pairs, settings.gauges_m, settings.head_width_m)
     kept = kept.of(~inside)
     kept = kept.of(~lower_than_beside(kept.lines, tolerances.spread_m))
