@@ -21,7 +21,7 @@ from .axis import CELL_M, Axis, unseen_m
 from .head_points import STATION_STEP_M, HeadPoints, Widths, near_lines, stations_along
 from .level import rough_level
 from .own_level import on_own_level
-from .smoother import KNOT_M
+from .smoother import BLUNT_HEIGHTS, KNOT_M, SHARP
 from .strips import StripOffsets, measure_strips
 from .top import MIN_POINTS, Top, by_lone_ridge, by_outline, find_top, fit_crown, smoothed
 
@@ -195,7 +195,7 @@ def _top_of(points: HeadPoints, axis: Axis, parameters: ElevationParameters) -> 
         return Top(course, points, np.zeros(len(points.t)))
     crown = fit_crown(points)
     level = replace(head, z=head.z + crown.fall(head.across))
-    smoothing_m, prior = parameters.smoothing_z_m, axis.course.prior
+    smoothing_m, prior = parameters.smoothing_z_m, BLUNT_HEIGHTS if axis.ridge else SHARP
     top = find_top(level, parameters.crown_radius_m, parameters.tolerance_z_m, smoothing_m, prior)
     if top is None:
         return None
