@@ -40,6 +40,10 @@ INSIDE_M, SPACING_M = 0.052, 0.05
 MIN_STATIONS = 3
 """Stations with a partner of five."""
 
+STOREY_M = 0.3
+"""Difference in height up to which places belong to one pavement: a wall of a groove, cant and gradient over a metre
+take less, and floors, decks and ceilings are 0.6 m and more apart."""
+
 MIN_LENGTH_M = 2.0
 """Shortest groove."""
 
@@ -90,9 +94,10 @@ NO_FLUSH = Flush(np.empty(0, dtype=np.int64), NO_LINES, NO_LINES)
 
 @dataclass(frozen=True)
 class NearBed:
-    """Points near the bed: their places, (n, 2), heights above it, coarse cells and levels of the bed, (n,) each."""
+    """Points near the bed: places, (n, 2), and, (n,) each, heights `z`, heights above the bed, coarse cells, levels."""
 
     xy: np.ndarray
+    z: np.ndarray
     height: np.ndarray
     coarse: np.ndarray
     level: np.ndarray
@@ -105,18 +110,28 @@ def flush_rails(shape: tuple[int, int], near: NearBed, grid: Grid, cell: np.ndar
     if not np.isfinite(below).any():
         return NO_FLUSH
     hollow = np.flatnonzero((below > CAVITY_M[0]) & (below < CAVITY_M[1]))
-    marks = centroids(cell[hollow], xy[hollow])
-    if len(marks) < 2:
+    marks = _marks(near, hollow, cell)
+    if len(marks.xy) < 2:
         return NO_FLUSH
-    lines = find_lines(Marks(marks, np.zeros(len(marks))), REACH_M, 1.0, BESIDE_LINE_M)
+    lines = find_lines(marks, REACH_M, STOREY_M, BESIDE_LINE_M)
     lines = lines.of(lines.good(MIN_COVER, MIN_PURE))
-    flat = xy[np.abs(below) < HEAD_LEVEL_M]
-    rails = [_at_edge(_grooves(lines, gauge_m), flat, head_width_m) for gauge_m in settings.gauges_m]
+    flat, places = np.abs(below) < HEAD_LEVEL_M, np.column_stack([xy, near.z])
+    rails = [_at_edge(_grooves(lines, gauge_m), places[flat], head_width_m) for gauge_m in settings.gauges_m]
     heads = [_guided(one, settings) for one in rails]
     upper = np.flatnonzero((below > -HEAD_LEVEL_M) & (below < FACE_M))
-    points = [upper[_on_heads(one, xy[upper], below[upper], head_width_m)] for one in heads]
+    points = [upper[_on_heads(one, places[upper], below[upper], head_width_m)] for one in heads]
     most = int(np.argmax([len(one.inward) for one in rails]))
     return Flush(np.unique(np.concatenate(points)), heads[most].lines, rails[most].lines)
+
+
+def _marks(points: NearBed, hollow: np.ndarray, cell: np.ndarray) -> Marks:
+    """Find the middles of hollow points, (k,) numbers, of each level in each cell, (n,), and their mean heights."""
+    key = points.level[hollow].astype(np.int64) * (int(cell.max()) + 1) + cell[hollow]
+    rank, number = np.unique(key, return_inverse=True)
+    # Whole numbers add up to the same sum in any order of the points.
+    tenths = np.bincount(number, np.round(points.z[hollow] * TENTHS_OF_MM), len(rank))
+    height = tenths / np.maximum(np.bincount(number, minlength=len(rank)), 1) / TENTHS_OF_MM
+    return Marks(centroids(key, points.xy[hollow]), height)
 
 
 def _guided(heads: Heads, settings: Settings) -> Heads:
@@ -166,7 +181,7 @@ class Heads:
 
 def _grooves(lines: Lines, gauge_m: float) -> Heads:
     """Keep the lines that have their partner at the gauge and are long enough."""
-    stations, side, _ = partners(lines, gauge_m - INSIDE_M, SPACING_M, 1.0)
+    stations, side, _ = partners(lines, gauge_m - INSIDE_M, SPACING_M, STOREY_M)
     paired = stations >= MIN_STATIONS
     lines, side = lines.of(paired), side[paired]
     pairs = links(lines)
@@ -175,26 +190,28 @@ def _grooves(lines: Lines, gauge_m: float) -> Heads:
     return Heads(lines.of(long), (side[:, None] * lines.across)[long])
 
 
-def _at_edge(grooves: Heads, xy: np.ndarray, head_width_m: float) -> Heads:
-    """Put the axes of the heads beside the outer edges of the grooves, given level points, (k, 2).
+def _at_edge(grooves: Heads, xyz: np.ndarray, head_width_m: float) -> Heads:
+    """Put the axes of the heads beside the outer edges of the grooves, given level points, (k, 3).
 
     The groove is a gap in what is level. A scanner to one side sees one wall only, and the middle of what it sees in
     the groove is not the groove's; but the gap begins where the head ends.
     """
-    if not len(grooves.inward) or not len(xy):
+    if not len(grooves.inward) or not len(xyz):
         return grooves.of(np.zeros(len(grooves.inward), dtype=bool))
-    edge_m = _outer_edges(_summed_along(grooves, _level_counts(grooves, xy)), head_width_m)
+    edge_m = _outer_edges(_summed_along(grooves, _level_counts(grooves, xyz)), head_width_m)
     seen = np.isfinite(edge_m)
     return grooves.of(seen).moved(edge_m[seen] - head_width_m / 2)
 
 
-def _level_counts(grooves: Heads, xy: np.ndarray) -> np.ndarray:
-    """Level points by distance inwards from each cell of a groove, (n, BINS)."""
+def _level_counts(grooves: Heads, xyz: np.ndarray) -> np.ndarray:
+    """Level points, (k, 3), of the same pavement by distance inwards from each cell of a groove, (n, BINS)."""
     axis, inward = grooves.lines.axis, grooves.inward
     reach_m = np.hypot(BIN_M * BINS / 2, SLICE_M)
-    near = cKDTree(axis).sparse_distance_matrix(cKDTree(xy), reach_m, output_type="ndarray")
-    own = near["i"]
-    step = xy[near["j"]] - axis[own]
+    near = cKDTree(axis).sparse_distance_matrix(cKDTree(xyz[:, :2]), reach_m, output_type="ndarray")
+    own, other = near["i"], near["j"]
+    same = np.abs(xyz[other, 2] - grooves.lines.height[own]) < STOREY_M
+    own, other = own[same], other[same]
+    step = xyz[other, :2] - axis[own]
     bins = np.floor(np.einsum("ij,ij->i", step, inward[own]) / BIN_M).astype(np.int64) + BINS // 2
     inside = np.abs(np.einsum("ij,ij->i", step, grooves.lines.along[own])) < SLICE_M
     inside &= (bins >= 0) & (bins < BINS)
@@ -206,6 +223,7 @@ def _summed_along(grooves: Heads, counts: np.ndarray) -> np.ndarray:
     axis, inward = grooves.lines.axis, grooves.inward
     one, other = cKDTree(axis).query_pairs(ALONG_M, output_type="ndarray").T
     same = np.abs(np.einsum("ij,ij->i", axis[other] - axis[one], inward[one])) < BESIDE_LINE_M
+    same &= np.abs(grooves.lines.height[other] - grooves.lines.height[one]) < STOREY_M
     same &= np.einsum("ij,ij->i", inward[one], inward[other]) > 0
     own = np.arange(len(axis))
     rows, columns = np.concatenate([own, one[same], other[same]]), np.concatenate([own, other[same], one[same]])
@@ -230,14 +248,17 @@ def _outer_edges(counts: np.ndarray, head_width_m: float) -> np.ndarray:
     return np.where(found, (head - middle + 0.5 + share) * BIN_M, np.nan)
 
 
-def _on_heads(heads: Heads, xy: np.ndarray, below_m: np.ndarray, head_width_m: float) -> np.ndarray:
-    """Return which points are on a head: on its level top, or on the face beside the groove, (k,) bool."""
-    if not len(heads.inward) or not len(xy):
-        return np.zeros(len(xy), dtype=bool)
-    distance, cell = cKDTree(heads.lines.axis).query(xy, distance_upper_bound=REACH_M / 2)
+def _on_heads(heads: Heads, xyz: np.ndarray, below_m: np.ndarray, head_width_m: float) -> np.ndarray:
+    """Return which points, (k, 3), are on a head: on its level top, or on the face beside the groove, (k,) bool."""
+    if not len(heads.inward) or not len(xyz):
+        return np.zeros(len(xyz), dtype=bool)
+    # Where pavements are one above the other, the nearest head in space is the one on the same.
+    axes = np.column_stack([heads.lines.axis, heads.lines.height])
+    distance, cell = cKDTree(axes).query(xyz, distance_upper_bound=REACH_M / 2)
     near = np.isfinite(distance)
-    inward = np.full(len(xy), np.inf)
-    inward[near] = np.einsum("ij,ij->i", xy[near] - heads.lines.axis[cell[near]], heads.inward[cell[near]])
+    inward = np.full(len(xyz), np.inf)
+    step = xyz[near, :2] - heads.lines.axis[cell[near]]
+    inward[near] = np.einsum("ij,ij->i", step, heads.inward[cell[near]])
     half_m = head_width_m / 2
     top = (np.abs(below_m) < HEAD_LEVEL_M) & (inward >= -half_m)
     face = (below_m >= HEAD_LEVEL_M) & (below_m < FACE_M) & (inward >= half_m - CORNER_M)

@@ -117,14 +117,22 @@ def _partnered(
 
 
 def runs_inside(
-    lines: Lines, paired: np.ndarray, links: np.ndarray, gauges_m: Sequence[float], head_width_m: float
+    lines: Lines,
+    rank: np.ndarray,
+    links: np.ndarray,
+    gauges_m: Sequence[float],
+    head_width_m: float,
+    height_m: float = np.inf,
 ) -> np.ndarray:
-    """Return which cells belong to something that runs along a rail of a track, at less than the gauge, (n,) bool.
+    """Return which cells belong to something that runs along what is rather a rail, at less than the gauge, (n,) bool.
 
-    Cells of rails that have their partner are `paired`, (n,); `links`, (m, 2), are pairs of cells on one line.
+    That has a higher `rank`, (n,), and differs by less than `height_m` in height above the bed; `links`, (m, 2), are
+    pairs of cells on one line.
     """
     inside = np.zeros(len(lines.axis), dtype=bool)
-    single, rails = np.flatnonzero(~paired), np.flatnonzero(paired)
+    if not len(rank):
+        return inside
+    single, rails = np.flatnonzero(rank < rank.max()), np.flatnonzero(rank > rank.min())
     if not len(single) or not len(rails):
         return inside
     reach_m = np.hypot(max(gauges_m), LEVEL_WITH_M)
@@ -138,6 +146,7 @@ def runs_inside(
     too_close_m = max(gauges_m) + head_width_m - SPACING_M
     beside = (left > head_width_m + INSIDE_M) & (left < too_close_m) & (ahead < LEVEL_WITH_M)
     beside &= _angle(lines.theta[own], lines.theta[rail]) < PARALLEL_RAD
+    beside &= (rank[own] < rank[rail]) & (np.abs(lines.height[own] - lines.height[rail]) < height_m)
     inside[own[beside]] = True
     return _majority(inside, links)
 

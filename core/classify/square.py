@@ -12,7 +12,7 @@ from .bed import COARSE_M, Bed, Coarse
 from .flush import NO_FLUSH, Flush, NearBed, flush_rails
 from .labels import Near, label, whole_heads
 from .lines import SINGLE_COVER, Lines, Marks, centred, find_lines, reach_at
-from .partner import are_within_gauge, have_partners, runs_inside
+from .partner import MAJORITY, are_within_gauge, have_partners, runs_inside
 from .pieces import (
     LEAST_SINGLE_M,
     lengths,
@@ -40,7 +40,8 @@ SINGLE_HEIGHT_M = 0.12
 
 AS_HIGH_M = 0.03
 """A rail without a partner may be lower if it stands as high as the rails of the square that have one, within this:
-ballast differs as much from track to track. Measured: 11 mm; kerbs and edges of slopes beside tracks 41 mm and more."""
+ballast differs as much from track to track. Measured: 11 mm; kerbs and edges of slopes beside tracks 41 mm and more.
+Guard rails stand as high as the rail that they guard, or up to 20 mm higher."""
 
 SINGLE_WIDTH = 0.2
 """Least width of a rail without a partner by that of a head. A single profile of the scanner is a bar of no width where
@@ -160,7 +161,7 @@ def classify_square(xyz: np.ndarray, settings: Settings) -> ByShape:
     grid, cell = Grid.around(xy[:, 0], xy[:, 1], settings.cell_m)
     tops = tops_of(grid, cell, height, z[near])
     standing = _standing(Shown(xy, cell, height, bed, tops), settings)
-    near_bed = NearBed(xy, height, bed.coarse.cell[near], level[near])
+    near_bed = NearBed(xy, z[near], height, bed.coarse.cell[near], level[near])
     paved = NO_FLUSH if settings.blunt else flush_rails(bed.coarse.shape, near_bed, grid, cell, settings)
     in_pavement = rail.copy()
     in_pavement[near[paved.points]] = True
@@ -258,6 +259,7 @@ def _on_ridges(kept: Kept, thin: bool, shown: Shown, settings: Settings) -> Stan
         ridges = Ridges.measure(shown.xy, shown.height, kept.lines, piece)
         blur_m = ridges.blur_m
         heads = ridges.may_be_heads(settings.head_width_m)
+        heads &= mean_of(kept.lines.cover, piece) >= SINGLE_COVER  # sleepers show gaps in images, and rails none
         heads &= are_within_gauge(steadied(kept.lines), piece, settings.spacings_m, BLUNT.partner_m)
         kept = kept.of(heads[piece])
         kept = replace(kept, paired=_paired(kept.lines, settings, BLUNT))
@@ -448,8 +450,9 @@ def _are_rails(kept: Kept, beside: Near, shown: Shown, settings: Settings, toler
     """Return which cells of narrow pieces belong to rails, (n,) bool: those with a partner, and some others.
 
     Rails without a partner are as narrow as a head and no narrower, stand as high as a rail does that is not buried in
-    ballast, or as those that have a partner, their bed is not steeper than a track's, the other rail may be hidden, and
-    they overhang. `beside` has the points in the height of the heads, and the cells near them.
+    ballast, or as those that have a partner, their bed is not steeper than a track's, they are not guard rails, they
+    overhang, and the other rail may be hidden. `beside` has the points in the height of the heads, and the cells near
+    them.
     """
     partnered = with_partner(kept.pairs, kept.paired)
     if partnered.all():
@@ -464,8 +467,19 @@ def _are_rails(kept: Kept, beside: Near, shown: Shown, settings: Settings, toler
         high |= np.abs(height_m - np.median(rails)) < AS_HIGH_M
     slope = np.hypot(*shown.bed.gradients(kept.lines.axis).T)
     alone = narrow & high & (mean_of(slope, piece) <= SINGLE_SLOPE)
+    alone &= ~_are_guards(kept, piece, partnered, settings)
     mine = alone[piece] & ~partnered
     lines, (numbers, number) = kept.lines.of(mine), np.unique(piece[mine], return_inverse=True)
     hidden = may_hide_partner(lines, number, shown.tops, settings, tolerances.partner_m)
     alone[numbers] = hidden & ~are_solid(lines, number, shown.xy, shown.height, settings.head_width_m)
     return partnered | alone[piece]
+
+
+def _are_guards(kept: Kept, piece: np.ndarray, partnered: np.ndarray, settings: Settings) -> np.ndarray:
+    """Return which pieces run along a longer one, or one with a partner, that is as high, within a gauge, (pieces,).
+
+    A guard rail ends before the rail that it guards, and hides it from a scanner beside the track.
+    """
+    length_m = np.where(partnered, np.inf, lengths(kept.lines.axis, piece)[piece])
+    inside = runs_inside(kept.lines, length_m, kept.pairs, settings.gauges_m, settings.head_width_m, AS_HIGH_M)
+    return mean_of(inside, piece) > MAJORITY

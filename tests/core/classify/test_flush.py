@@ -102,3 +102,10 @@ def test_the_side_of_a_vehicle_at_gauge_from_a_groove_is_no_rail():
     side[:, 1] = xyz[0, 1] - across[0] - GAUGE / 2 + GROOVE / 2 + 0.002 * rng.standard_normal(len(side))
     side[:, 2] = rng.uniform(0.75, 3.0, len(side))
     assert not classify_square(np.concatenate([xyz, side]), SETTINGS).rail.any()
+
+
+def test_grooves_of_two_storeys_are_not_those_of_a_track():
+    """As the joints of the vault of a tunnel may seem to be, above its floor."""
+    xyz, _, _ = street(0.003)
+    xyz[turned(xyz, 0.3)[1] > 0.2, 2] += 4.0
+    assert not classify_square(xyz, SETTINGS).rail.any()

@@ -47,6 +47,14 @@ def test_walls_at_the_distance_of_rails_are_too_wide(width_m, blur_m):
     assert figures.paired_m + figures.single_m == 0
 
 
+@pytest.mark.parametrize(("gaps_m", "found"), [(0.0, True), (0.35, False)])
+def test_a_rail_has_no_gaps_in_images_and_a_row_of_sleepers_has(gaps_m, found):
+    """Ends of sleepers are as narrow as a head where ballast lies on both sides, and another row may be at gauge."""
+    shape, plain = bars(MATCHED_M, 0.10, 0.042), bars(MATCHED_M, 0.0, 0.042)
+    ends = shape[:, 1] % 0.6 >= gaps_m
+    assert (found_m(np.where(ends[:, None], shape, plain)).paired_m > SIDE_M) == found
+
+
 def lines_beside(across_m):
     """Cells of a line along x, 4 cm apart, with their axes aside."""
     along_m = 0.04 * np.arange(len(across_m))

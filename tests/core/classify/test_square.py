@@ -138,6 +138,19 @@ def test_a_lone_bar_is_a_rail_where_something_may_hide_the_other_one(wide_m, kep
     assert classify_square(rough(xyz, rng)[~hidden], SETTINGS).rail.any() == kept
 
 
+def test_of_two_lone_bars_within_a_gauge_the_shorter_one_is_a_guard_rail():
+    """A guard rail hides the rail that it guards from a scanner beside the track, so that neither bar has a partner."""
+    rng = np.random.RandomState(21)
+    xyz, rail = with_bar(flat(12.0, rng=rng, per_m2=2500), WIDTH, 0.0, -SPACING / 2)
+    place_m = SPACING / 2 - WIDTH - 0.045
+    xyz, guard = with_bar(xyz, WIDTH, 0.0, place_m, TOP_M + 0.01, length_m=9.0)
+    shown = turned(xyz, 0.0)[1] < place_m + WIDTH / 2
+    xyz, rail, guard = rough(xyz, rng)[shown], rail[shown], guard[shown]
+    found = classify_square(xyz, SETTINGS).rail
+    assert found[rail & inner(xyz, 10)].mean() > 0.95
+    assert not found[guard].any()
+
+
 @pytest.mark.parametrize(("height_m", "kept"), [(0.17, False), (0.25, True)])
 def test_ground_below_the_place_of_the_other_rail_shows_no_rail_only_where_its_foot_would_hide_it(height_m, kept):
     rng = np.random.RandomState(21)
