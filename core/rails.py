@@ -445,6 +445,11 @@ class SearchFigures:
         return self.cells / length_m if length_m else 0.0
 
     @property
+    def is_from_air(self) -> bool:
+        """Whether all squares with rails are thin: a scanner on the ground shows what is near it with more points."""
+        return 0 < self.squares == self.thin
+
+    @property
     def blur_m(self) -> float:
         """Mean blur where heads are blunt, metres; 0 where they are not."""
         return self.blur_m2 / self.blunt_m if self.blunt_m else 0.0

@@ -174,5 +174,6 @@ def _gathered(
     if blunt_marks:
         source = replace(source, found=True)
         return SortedPoints(parted(source, {source.passes[mark] for mark in blunt_marks}), figures)
-    blunt = True if figures.blunt_m else None  # narrow ones may have no edges either
+    # Narrow heads may have no edges either: a scanner on the ground has dense squares, and beams from the air are wide.
+    blunt = True if figures.blunt_m or figures.is_from_air else None
     return SortedPoints([replace(source, found=True, blunt=blunt)], figures)
