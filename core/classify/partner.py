@@ -13,6 +13,7 @@ from scipy.ndimage import median
 from scipy.spatial import cKDTree
 
 from .lines import Lines
+from .pieces import LEAST_PAIRED, mean_of
 
 STATIONS = (-0.6, -0.3, 0.0, 0.3, 0.6)
 """Places along the line, in reaches, where a partner is looked for: a gap or a frog hides some."""
@@ -62,7 +63,8 @@ def have_partners(lines: Lines, spacings_m: Sequence[float], height_m: float) ->
 def are_within_gauge(lines: Lines, piece: np.ndarray, spacings_m: Sequence[float], height_m: float) -> np.ndarray:
     """Return which pieces, of (n,) cells, are near enough to their partners for a track, (pieces,) bool.
 
-    The median over a piece decides. The axes of cells must be steady.
+    The median over a piece decides, and enough of it must have a partner that differs by at most `height_m` in height
+    above the bed. Axes and heights of cells must be steady.
     """
     count = int(piece.max()) + 1 if len(piece) else 0
     fit = np.zeros(count, dtype=bool)
@@ -70,7 +72,8 @@ def are_within_gauge(lines: Lines, piece: np.ndarray, spacings_m: Sequence[float
         apart_m = partners(lines, spacing_m, SPACING_M, height_m)[2]
         seen = np.isfinite(apart_m)
         if seen.any():
-            fit |= median(apart_m[seen], piece[seen], np.arange(count)) < spacing_m + TOO_WIDE_M
+            near = median(apart_m[seen], piece[seen], np.arange(count)) < spacing_m + TOO_WIDE_M
+            fit |= near & (mean_of(seen, piece) >= LEAST_PAIRED)
     return fit
 
 

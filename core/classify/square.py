@@ -25,7 +25,7 @@ from .pieces import (
     stands_free,
     with_partner,
 )
-from .ridges import Ridges, cells_beside, on_crests, steadied
+from .ridges import LEVEL_M, Ridges, cells_beside, on_crests, steadied
 from .settings import BLUNT, MARGIN_M, Settings, Tolerances, Way
 from .tops import HIGH_M, LOW_M, MILLIMETRES, Band, Grid, Tops, highest_of_blocks, middles_of_tops, narrow_tops, tops_of
 
@@ -260,7 +260,7 @@ def _on_ridges(kept: Kept, thin: bool, shown: Shown, settings: Settings) -> Stan
         blur_m = ridges.blur_m
         heads = ridges.may_be_heads(settings.head_width_m)
         heads &= mean_of(kept.lines.cover, piece) >= SINGLE_COVER  # sleepers show gaps in images, and rails none
-        heads &= are_within_gauge(steadied(kept.lines), piece, settings.spacings_m, BLUNT.partner_m)
+        heads &= are_within_gauge(steadied(kept.lines), piece, settings.spacings_m, LEVEL_M)
         kept = kept.of(heads[piece])
         kept = replace(kept, paired=_paired(kept.lines, settings, BLUNT))
         kept = kept.of(_long(kept, settings, False, BLUNT.least_m))

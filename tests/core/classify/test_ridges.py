@@ -47,6 +47,14 @@ def test_walls_at_the_distance_of_rails_are_too_wide(width_m, blur_m):
     assert figures.paired_m + figures.single_m == 0
 
 
+@pytest.mark.parametrize(("lower_m", "found"), [(0.02, True), (0.064, False)])
+def test_the_ridges_of_a_track_are_as_high_as_each_other(lower_m, found):
+    """As a rail and a low wall at gauge are not; their single cells seem to be."""
+    high, low = bars(MATCHED_M, 0.17, 0.042, noise_m=0.008), bars(MATCHED_M, 0.17 - lower_m, 0.042, noise_m=0.008)
+    xyz = np.where(high[:, :1] > 7.0, high, low)
+    assert (found_m(xyz).paired_m > SIDE_M) == found
+
+
 @pytest.mark.parametrize(("gaps_m", "found"), [(0.0, True), (0.35, False)])
 def test_a_rail_has_no_gaps_in_images_and_a_row_of_sleepers_has(gaps_m, found):
     """Ends of sleepers are as narrow as a head where ballast lies on both sides, and another row may be at gauge."""
