@@ -99,7 +99,7 @@ class Raw:
                 raise
             is_warned = warn_of_raw(self.request, figures, parameters, progress)
             points = _gathered(self.request, side_m, sorted_points, census, figures, blunt_marks)
-            yield replace(points, only_pairs=True, is_warned=is_warned)
+            yield replace(points, only_pairs=figures.blunt_m > 0, is_warned=is_warned)
 
     def _find(
         self,

@@ -76,5 +76,16 @@ def test_heads_in_a_raw_cloud_from_the_air_have_no_edges():
     assert judged.figures["across mm"] < 4
 
 
+def test_rails_that_are_no_ridges_need_no_partner(tmp_path):
+    """From the air, heads are blunt, but bars as narrow as heads were looked for, and 60 m of rail were dropped."""
+    world = make(9212)
+    world.write(tmp_path / "world.laz")
+    standard = world.scene.standard
+    parameters = Parameters(standard.gauge_m, standard.head_width_m)
+    with asked(tmp_path / "world.laz").sort(tmp_path, parameters, Runner(), SILENT) as points:
+        assert [source.blunt for source in points.classes] == [True]
+        assert not points.only_pairs
+
+
 def asked(*files):
     return Raw(ask(files, SEARCHED_CLASSES, None, None, SILENT))
