@@ -90,8 +90,10 @@ def _run_on(
     if len({end // 2 for end in left_m}) < len(left_m) or min(left_m[leg] for leg in ways) < SKIP_M + DIRECTION_M:
         return None
     back_m = max(_merged_m(one, other) for one, other in combinations(ways.values(), 2))
-    if not 0 < back_m < min(MAX_BACK_M, left_m[stem] - DIRECTION_M):
+    room_m = left_m[stem] - SKIP_M - DIRECTION_M
+    if not 0 < back_m < MAX_BACK_M or room_m <= 0:
         return None
+    back_m = min(back_m, room_m)  # where another branching lies in between, the rest is merged there as well
     trunk = cut_back(network.from_end(stem), back_m)
     rails = {leg: cut_back(network.from_end(leg), SKIP_M) for leg in ways}
     steady = min(rails, key=lambda leg: unsteadiness(trunk, rails[leg], ROUTE_M))

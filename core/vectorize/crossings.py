@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 
 from ..lines.ends import Bridge, bridge, cut_back, even_points, tip_and_direction
 from ..lines.network import LineNetwork
-from .junctions import DIRECTION_M, ends_by_node, unsteadiness, weld_pairs
+from .junctions import DIRECTION_M, ends_by_node, weld_pairs
 
 MAX_MERGED_M = 14.0
 """Largest length that two crossing rails share. Heads of 76 mm in cells of 40 mm share 9 m at 1:26.5, and wing rails
@@ -29,10 +29,6 @@ SKIP_M = 0.5
 MISFIT_M = 0.015
 """Misfit allowed to the legs of a crossing. It is larger than across gaps because wing rails widen the legs, and
 because four legs that meet are known to belong together."""
-
-DECIDING_M = 12.0
-"""Length of each leg that decides its continuation. A rail of a 1:26.5 frog that continued as the other rail would be
-off a constant curvature by 16 mm over this length; stairs make half as much."""
 
 WINGS_M = (0.0, 1.0, 2.0, 3.0)
 """Further lengths cut off all legs before they are paired, in this order: wing rails run beside the rails for up to 3 m
@@ -200,7 +196,10 @@ def _cut_off(network: LineNetwork) -> list[dict[int, float]]:
 
 
 def _best_pairing(network: LineNetwork, legs: Mapping[int, float]) -> dict[tuple[int, int], Bridge]:
-    """Connect four legs in the two pairs that keep the curvature of both rails best; empty if no rails could follow."""
+    """Connect four legs in the two pairs that turn least; empty if no rails could follow.
+
+    Rails that continued as each other would turn by the angle at which they cross, both.
+    """
     lengths = network.lengths()
     shortest_m = min(lengths[end // 2] - skip_m for end, skip_m in legs.items())
     options = [
@@ -211,15 +210,16 @@ def _best_pairing(network: LineNetwork, legs: Mapping[int, float]) -> dict[tuple
     ]
     if not options:
         return {}
-    _, steadiest = min(options, key=lambda option: option[0])
-    return next(bridges for _, bridges in options if bridges.keys() == steadiest.keys())
+    _, straightest = min(options, key=lambda option: option[0])
+    return next(bridges for _, bridges in options if bridges.keys() == straightest.keys())
 
 
 def _options(
     network: LineNetwork, legs: Mapping[int, float], wing_m: float
 ) -> Iterator[tuple[float, dict[tuple[int, int], Bridge]]]:
-    """Yield each way to connect four legs in two pairs that rails could follow, with its unsteadiness squared, m²."""
+    """Yield each way to connect four legs in two pairs that rails could follow, with the sum of its squared turns."""
     cut = {end: cut_back(network.from_end(end), skip_m) for end, skip_m in legs.items()}
+    tips = {end: tip_and_direction(even_points(way, DIRECTION_M)) for end, way in cut.items()}
     ends = list(legs)
     for (a, b), (c, d) in _PAIRINGS:
         pairs = (ends[a], ends[b]), (ends[c], ends[d])
@@ -230,4 +230,11 @@ def _options(
             if curve is not None
         }
         if len(bridges) == len(pairs):
-            yield sum(unsteadiness(cut[one], cut[other], DECIDING_M) ** 2 for one, other in pairs), bridges
+            yield sum(_turn(tips[one], tips[other]) for one, other in pairs), bridges
+
+
+def _turn(one: tuple[np.ndarray, np.ndarray], other: tuple[np.ndarray, np.ndarray]) -> float:
+    """Sum the squared turns, as chords, from one end to the other and on into it, given their tips and directions."""
+    (tip, outward), (other_tip, other_outward) = one, other
+    across = (other_tip - tip) / np.hypot(*(other_tip - tip))
+    return float(np.sum((across - outward) ** 2 + (across + other_outward) ** 2))

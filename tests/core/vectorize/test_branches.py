@@ -34,6 +34,25 @@ def test_a_merged_part_is_resolved_into_two_rails(radius):
     assert cKDTree(trace([Element(80, 1 / radius, 1 / radius)], (40.0, 0.0)).xy).query(branch)[0].max() < 0.02
 
 
+def test_the_stem_of_branchings_one_after_another_runs_on_through_both():
+    stock = along_x(0, 120)
+    arcs = [trace([Element(50, 1 / 300, 1 / 300)], (toe, 0.0)).xy[::5] for toe in (40.0, 50.0)]
+    first, second = (np.array([[toe + np.sqrt(2 * 300 * 0.2), 0.1]]) for toe in (40.0, 50.0))
+    x, x1, x2 = stock[:, 0], first[0, 0], second[0, 0]
+    legs = [rail[rail[:, 0] > fork[0, 0]] for rail, fork in ((arcs[0], first), (arcs[1], second), (stock, second))]
+    lines = (
+        np.concatenate([stock[x < x1], first]),
+        np.concatenate([first, stock[(x > x1) & (x < x2)], second]),
+        *(np.concatenate([fork, leg]) for fork, leg in zip((first, second, second), legs)),
+    )
+    nodes = np.concatenate([first, second, stock[:1], *(leg[-1:] for leg in legs)])
+    network = part_branches(LineNetwork(lines, nodes, np.array([[2, 0], [0, 1], [0, 3], [1, 4], [1, 5]])))
+    network = attach_branches(network, cKDTree(np.concatenate([stock, *arcs])), 5.0)
+    through = max(network.lines, key=len)
+    assert np.ptp(through[:, 0]) > 119
+    assert np.abs(through[:, 1]).max() < 0.02
+
+
 @pytest.mark.parametrize("sense", [1, -1])
 @pytest.mark.parametrize("radius", [190, 500, 1200])
 def test_a_branch_that_ends_freely_is_extended_tangentially_to_its_stock_rail(radius, sense):

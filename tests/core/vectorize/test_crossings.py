@@ -45,6 +45,19 @@ def test_legs_that_wing_rails_draw_aside_continue_straight(aside_m):
     check_that_two_rails_cross(resolve_crossings(network(legs, (), [(0.0, 0.0)])))
 
 
+@pytest.mark.parametrize("length_m", [7.0, 7.5])
+def test_short_legs_that_wing_rails_draw_apart_still_cross(length_m):
+    legs = [
+        *((0, leg(-1, slope, 0.2)) for slope in (SLOPE, -SLOPE)),
+        *((0, leg(1, slope, 0.2, aside_m, 4.0)) for slope, aside_m in ((SLOPE, 0.14), (-SLOPE, -0.1))),
+    ]
+    legs = [(node, line[np.abs(line[:, 0]) < length_m]) for node, line in legs]
+    found = resolve_crossings(network(legs, (), [(0.0, 0.0)]))
+    assert len(found.lines) == 2
+    for line in found.lines:
+        assert np.sign(line[0]) @ np.sign(line[-1]) == -2.0
+
+
 def test_a_frog_of_several_nodes_is_one_crossing():
     nodes = [(-0.6, 0.0), (0.6, 0.05), (1.5, -1.5 * SLOPE)]
     legs = [(0, leg(-1, SLOPE, 0.8)), (0, leg(-1, -SLOPE, 0.8)), (1, leg(1, SLOPE, 0.8)), (2, leg(1, -SLOPE, 1.7))]
