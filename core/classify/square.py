@@ -9,7 +9,7 @@ import numpy as np
 from ..rails import SearchFigures
 from .alone import are_solid, may_hide_partner
 from .bed import COARSE_M, Bed, Coarse
-from .flush import NO_FLUSH, Flush, NearBed, flush_rails
+from .flush import NO_FLUSH, STOREY_M, Flush, NearBed, flush_rails
 from .labels import Near, label, whole_heads
 from .lines import SINGLE_COVER, Lines, Marks, centred, find_lines, reach_at
 from .partner import MAJORITY, are_within_gauge, have_partners, runs_inside
@@ -72,11 +72,12 @@ a guard rail, the axis would lie between both rails."""
 
 @dataclass(frozen=True)
 class Shown:
-    """What a square shows near its bed: places, (n, 2), of points, their cells and heights above the bed, (n,)."""
+    """What a square shows near its bed: places, (n, 2), of points, and cells, heights above the bed and `z`, (n,)."""
 
     xy: np.ndarray
     cell: np.ndarray
     height: np.ndarray
+    z: np.ndarray
     bed: Bed
     tops: Tops
 
@@ -160,7 +161,7 @@ def classify_square(xyz: np.ndarray, settings: Settings) -> ByShape:
     height, xy = height[near], xyz[near, :2]
     grid, cell = Grid.around(xy[:, 0], xy[:, 1], settings.cell_m)
     tops = tops_of(grid, cell, height, z[near])
-    standing = _standing(Shown(xy, cell, height, bed, tops), settings)
+    standing = _standing(Shown(xy, cell, height, z[near], bed, tops), settings)
     near_bed = NearBed(xy, z[near], height, bed.coarse.cell[near], level[near])
     paved = NO_FLUSH if settings.blunt else flush_rails(bed.coarse.shape, near_bed, grid, cell, settings)
     in_pavement = rail.copy()
@@ -431,13 +432,15 @@ def _by_shape(
 def _are_flat(kept: Kept, chosen: np.ndarray, shown: Shown, head_width_m: float) -> np.ndarray:
     """Return which cells belong to pieces with flat tops, (n,) bool, given the points in the height of their tops.
 
-    They hold as many points as the heads of a square that is not thin: a few may be level by chance.
+    The vault of a tunnel, which has a level of its own above the track, does not count. They hold as many points as the
+    heads of a square that is not thin: a few may be level by chance.
     """
     if not len(kept.cell):
         return np.zeros(0, dtype=bool)
     piece, near = pieces_of(len(kept.cell), kept.pairs), Near.find(shown.xy, kept.lines)
     place, nearest = np.unique(near.place, return_index=True)
     inside = np.abs(near.across[nearest]) <= head_width_m / 2
+    inside &= np.abs(shown.z[place] - shown.tops.z.ravel()[kept.cell[near.cell[nearest]]]) < STOREY_M
     number = piece[near.cell[nearest[inside]]]
     every, level = (
         np.bincount(number, np.isin(place[inside], which), int(piece.max()) + 1) for which in (place, chosen)

@@ -111,6 +111,13 @@ def test_heads_just_above_the_ballast_are_flat(share, per_m2, found_m):
     assert figures[1].paired_m == figures[1].filled_m == pytest.approx(found_m, abs=1.0)
 
 
+def test_heads_just_above_the_ballast_are_flat_under_the_vault_of_a_tunnel():
+    vault = filled_track(0.0, 1800) + [0.0, 0.0, 7.0]
+    tunnel = np.concatenate([filled_track(1.0, 900), vault])
+    figures = classify_square(tunnel, Settings((1.435,), 0.072, way=Way.FILLED)).figures
+    assert figures.filled_m == pytest.approx(2 * 16.0, abs=1.0)
+
+
 SHARP, ROUND, NOTHING = (30.0, 2.0), (0.5, 60.0), (0.0, 0.0)
 """Lengths of sharp and of round rails in a part of a cloud."""
 
