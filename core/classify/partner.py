@@ -126,11 +126,12 @@ def runs_inside(
     gauges_m: Sequence[float],
     head_width_m: float,
     height_m: float = np.inf,
+    more: float = 0.0,
 ) -> np.ndarray:
     """Return which cells belong to something that runs along what is rather a rail, at less than the gauge, (n,) bool.
 
-    That has a higher `rank`, (n,), and differs by less than `height_m` in height above the bed; `links`, (m, 2), are
-    pairs of cells on one line.
+    That has a `rank`, (n,), higher by `more`, and differs by less than `height_m` in height above the bed; `links`,
+    (m, 2), are pairs of cells on one line.
     """
     inside = np.zeros(len(lines.axis), dtype=bool)
     if not len(rank):
@@ -149,7 +150,7 @@ def runs_inside(
     too_close_m = max(gauges_m) + head_width_m - SPACING_M
     beside = (left > head_width_m + INSIDE_M) & (left < too_close_m) & (ahead < LEVEL_WITH_M)
     beside &= _angle(lines.theta[own], lines.theta[rail]) < PARALLEL_RAD
-    beside &= (rank[own] < rank[rail]) & (np.abs(lines.height[own] - lines.height[rail]) < height_m)
+    beside &= (rank[own] + more < rank[rail]) & (np.abs(lines.height[own] - lines.height[rail]) < height_m)
     inside[own[beside]] = True
     return _majority(inside, links)
 

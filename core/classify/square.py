@@ -43,6 +43,10 @@ AS_HIGH_M = 0.03
 ballast differs as much from track to track. Measured: 11 mm; kerbs and edges of slopes beside tracks 41 mm and more.
 Guard rails stand as high as the rail that they guard, or up to 20 mm higher."""
 
+GUARD_SHORTER_M = 2.0
+"""Least difference in length of a guard rail and the rail that it guards: it ends a metre before it on both sides. Two
+lone rails that are as long as each other are both rails, as where one of each of two tracks is hidden."""
+
 SINGLE_WIDTH = 0.2
 """Least width of a rail without a partner by that of a head. A single profile of the scanner is a bar of no width where
 the ground falls beside it, as at the edge of a road: measured 2 to 4 mm. Heads measure 68 mm, and 19 mm where a train
@@ -484,5 +488,7 @@ def _are_guards(kept: Kept, piece: np.ndarray, partnered: np.ndarray, settings: 
     A guard rail ends before the rail that it guards, and hides it from a scanner beside the track.
     """
     length_m = np.where(partnered, np.inf, lengths(kept.lines.axis, piece)[piece])
-    inside = runs_inside(kept.lines, length_m, kept.pairs, settings.gauges_m, settings.head_width_m, AS_HIGH_M)
+    inside = runs_inside(
+        kept.lines, length_m, kept.pairs, settings.gauges_m, settings.head_width_m, AS_HIGH_M, GUARD_SHORTER_M
+    )
     return mean_of(inside, piece) > MAJORITY
