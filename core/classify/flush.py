@@ -12,7 +12,7 @@ from scipy.ndimage import binary_dilation, binary_propagation
 from scipy.sparse import csr_matrix
 from scipy.spatial import cKDTree
 
-from .bed import COARSE_M, MAX_LEVELS
+from .bed import COARSE_M, MAX_LEVELS, STOREY_M
 from .lines import Lines, Marks, find_lines
 from .partner import partners
 from .pieces import lengths, links, pieces_of
@@ -39,10 +39,6 @@ INSIDE_M, SPACING_M = 0.052, 0.05
 
 MIN_STATIONS = 3
 """Stations with a partner of five."""
-
-STOREY_M = 0.3
-"""Difference in height up to which places belong to one pavement: a wall of a groove, cant and gradient over a metre
-take less, and floors, decks and ceilings are 0.6 m and more apart."""
 
 MIN_LENGTH_M = 2.0
 """Shortest groove."""
@@ -109,13 +105,14 @@ def flush_rails(shape: tuple[int, int], near: NearBed, grid: Grid, cell: np.ndar
     xy, below = near.xy, _pavement(shape, near) - near.height
     if not np.isfinite(below).any():
         return NO_FLUSH
+    places = np.column_stack([xy, near.z])
     hollow = np.flatnonzero((below > CAVITY_M[0]) & (below < CAVITY_M[1]))
-    marks = _marks(near, hollow, cell)
+    marks = _marks(places[hollow], near.level[hollow], cell[hollow])
     if len(marks.xy) < 2:
         return NO_FLUSH
     lines = find_lines(marks, REACH_M, STOREY_M, BESIDE_LINE_M)
     lines = lines.of(lines.good(MIN_COVER, MIN_PURE))
-    flat, places = np.abs(below) < HEAD_LEVEL_M, np.column_stack([xy, near.z])
+    flat = np.abs(below) < HEAD_LEVEL_M
     rails = [_at_edge(_grooves(lines, gauge_m), places[flat], head_width_m) for gauge_m in settings.gauges_m]
     heads = [_guided(one, settings) for one in rails]
     upper = np.flatnonzero((below > -HEAD_LEVEL_M) & (below < FACE_M))
@@ -124,14 +121,10 @@ def flush_rails(shape: tuple[int, int], near: NearBed, grid: Grid, cell: np.ndar
     return Flush(np.unique(np.concatenate(points)), heads[most].lines, rails[most].lines)
 
 
-def _marks(points: NearBed, hollow: np.ndarray, cell: np.ndarray) -> Marks:
-    """Find the middles of hollow points, (k,) numbers, of each level in each cell, (n,), and their mean heights."""
-    key = points.level[hollow].astype(np.int64) * (int(cell.max()) + 1) + cell[hollow]
-    rank, number = np.unique(key, return_inverse=True)
-    # Whole numbers add up to the same sum in any order of the points.
-    tenths = np.bincount(number, np.round(points.z[hollow] * TENTHS_OF_MM), len(rank))
-    height = tenths / np.maximum(np.bincount(number, minlength=len(rank)), 1) / TENTHS_OF_MM
-    return Marks(centroids(key, points.xy[hollow]), height)
+def _marks(places: np.ndarray, level: np.ndarray, cell: np.ndarray) -> Marks:
+    """Find the middles and mean heights of hollow places, (k, 3), of each level, (k,), in each cell, (k,)."""
+    middles = centroids(level.astype(np.int64) * (int(cell.max(initial=0)) + 1) + cell, places)
+    return Marks(middles[:, :2], middles[:, 2])
 
 
 def _guided(heads: Heads, settings: Settings) -> Heads:

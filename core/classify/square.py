@@ -8,8 +8,8 @@ import numpy as np
 
 from ..rails import SearchFigures
 from .alone import are_solid, may_hide_partner
-from .bed import COARSE_M, Bed, Coarse
-from .flush import NO_FLUSH, STOREY_M, Flush, NearBed, flush_rails
+from .bed import COARSE_M, STOREY_M, Bed, Coarse
+from .flush import NO_FLUSH, Flush, NearBed, flush_rails
 from .labels import Near, label, whole_heads
 from .lines import SINGLE_COVER, Lines, Marks, centred, find_lines, reach_at
 from .partner import MAJORITY, are_within_gauge, have_partners, runs_inside

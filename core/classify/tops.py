@@ -206,12 +206,12 @@ def middles_of_tops(
     return places
 
 
-def centroids(cell: np.ndarray, xy: np.ndarray) -> np.ndarray:
-    """Mean places of the points of each cell that has any, in the order of the cells, (k, 2)."""
+def centroids(cell: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Mean places of the points, (n, d), of each cell that has any, in the order of the cells, (k, d)."""
     cells, number = np.unique(cell, return_inverse=True)
     count = np.bincount(number, minlength=len(cells))
     # Whole numbers add up to the same sum in any order of the points.
-    tenths = np.round(xy * TENTHS_OF_MM)
+    tenths = np.round(places * TENTHS_OF_MM)
     return np.column_stack([np.bincount(number, column, len(cells)) / count for column in tenths.T]) / TENTHS_OF_MM
 
 
