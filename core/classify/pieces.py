@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import coo_matrix
+from scipy.sparse import coo_matrix, csr_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
@@ -145,26 +145,49 @@ def shares_of_length(lines: Lines, half_m: float) -> np.ndarray:
     return share_m
 
 
-def stands_free(tops: Tops, band: Band, marks: np.ndarray, lines: Lines, slope: np.ndarray) -> np.ndarray:
+def stands_free(
+    tops: Tops, band: Band, marks: np.ndarray, lines: Lines, slope: np.ndarray, pairs: np.ndarray
+) -> np.ndarray:
     """Return which lines of cells, `marks`, have lower ground, or nothing seen, on each side, (n,) bool.
 
-    Lower than a plane through the line, that is, with this `slope` to the left, (n,), height per length.
+    Lower than a plane through the line, that is, with this `slope` to the left, (n,), height per length. Each cell
+    decides with those that continue it, `pairs`, (m, 2): in a thin cloud, or where the scanner is far, a cell alone
+    sees one place of what is beside it, or none.
+    """
+    seen, high = (_with_continued(counts, lines, pairs) for counts in _seen_beside(tops, band, marks, lines, slope))
+    return ((2 * high > seen).sum(axis=2) <= MAX_HIGH).all(axis=1)
+
+
+def _seen_beside(
+    tops: Tops, band: Band, marks: np.ndarray, lines: Lines, slope: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Count the places beside each line that are seen, and of these the high ones: (n, 2, distances) each.
+
+    The left side comes first.
     """
     along = np.linspace(-0.5, 0.5, ALONG) * lines.reach_m
-    free = np.ones(len(lines.axis), dtype=bool)
+    seen, high = (np.zeros((len(lines.axis), 2, len(ACROSS_M)), dtype=np.int64) for _ in range(2))
     depth_m = band.depth_m(lines.height)
     z, high_cells = tops.z.ravel(), tops.high.ravel()
     own, ahead_m, left_m = z[marks], lines.along, lines.across
-    for side in (1, -1):
-        distances = np.zeros(len(free), dtype=np.int64)
-        for left in ACROSS_M:
-            seen, high = np.zeros(len(free), dtype=np.int64), np.zeros(len(free), dtype=np.int64)
+    for number, side in enumerate((1, -1)):
+        for distance, left in enumerate(ACROSS_M):
             for ahead in along:
                 cell, inside = tops.grid.cells(lines.axis + ahead * ahead_m + side * left * left_m)
                 rise = z[cell] - own - side * left * slope
                 wall = inside & high_cells[cell]
-                seen += wall | (inside & (np.abs(rise) < HIGH_M))
-                high += wall | (inside & (rise >= -depth_m) & (rise < HIGH_M))
-            distances += 2 * high > seen
-        free &= distances <= MAX_HIGH
-    return free
+                seen[:, number, distance] += wall | (inside & (np.abs(rise) < HIGH_M))
+                high[:, number, distance] += wall | (inside & (rise >= -depth_m) & (rise < HIGH_M))
+    return seen, high
+
+
+def _with_continued(counts: np.ndarray, lines: Lines, pairs: np.ndarray) -> np.ndarray:
+    """Add to each cell's counts on both sides, (n, 2, k), those of the cells that continue it, `pairs`, (m, 2)."""
+    one, other = np.concatenate([pairs, pairs[:, ::-1]]).T
+    turned = np.einsum("ij,ij->i", lines.across[one], lines.across[other]) < 0  # lines have no direction
+    total, columns = counts.copy(), np.prod(counts.shape[1:])
+    for chosen, of_others in ((~turned, counts), (turned, counts[:, ::-1])):
+        ones = np.ones(int(chosen.sum()), dtype=np.int64)
+        of_each = csr_matrix((ones, (one[chosen], other[chosen])), shape=(len(counts), len(counts)))
+        total += (of_each @ of_others.reshape(-1, columns)).reshape(total.shape)
+    return total

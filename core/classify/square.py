@@ -358,16 +358,22 @@ def _kept(found: Candidates, bed: Bed, reach_m: float, tolerances: Tolerances, s
     lines = centred(lines.of(good), found.at(found.cells), half_m, tolerances.along_m)
     cant = np.einsum("ij,ij->i", bed.gradients(lines.axis), lines.across)
     cant[np.abs(cant) > CANT] = 0.0
-    free = stands_free(found.tops, tolerances.band, found.marks[good], lines, cant)
-    lines, marks = lines.of(free), found.marks[good[free]]
-    paired, pairs = _paired(lines, settings, tolerances), links(lines)
-    alone, free = np.flatnonzero(~paired), paired.copy()  # only a track is canted
-    free[alone] = stands_free(found.tops, tolerances.band, marks[alone], lines.of(alone), np.zeros(len(alone)))
-    kept = Kept(lines, marks, paired, pairs).of(_certain(lines, paired, pairs) & free)
+    kept = Kept(lines, found.marks[good], np.zeros(len(good), dtype=bool), links(lines))
+    kept = kept.of(_stands_free(kept, cant, found.tops, tolerances.band))
+    kept = replace(kept, paired=_paired(kept.lines, settings, tolerances))
+    alone = kept.of(~kept.paired)
+    free = kept.paired.copy()  # only a track is canted
+    free[~kept.paired] = _stands_free(alone, np.zeros(len(alone.cell)), found.tops, tolerances.band)
+    kept = kept.of(_certain(kept.lines, kept.paired, kept.pairs) & free)
     inside = runs_inside(kept.lines, kept.paired, kept.pairs, settings.gauges_m, settings.head_width_m)
     kept = kept.of(~inside)
     kept = kept.of(~lower_than_beside(kept.lines, tolerances.spread_m))
     return kept.of(_long(kept, settings, settings.keep_single, tolerances.least_m))
+
+
+def _stands_free(kept: Kept, slope: np.ndarray, tops: Tops, band: Band) -> np.ndarray:
+    """Return which cells stand free of what is beside them, (n,) bool; see `pieces.stands_free`."""
+    return stands_free(tops, band, kept.cell, kept.lines, slope, kept.pairs)
 
 
 def _paired(lines: Lines, settings: Settings, tolerances: Tolerances) -> np.ndarray:

@@ -44,6 +44,21 @@ def test_rails_are_labelled_where_next_to_nothing_of_the_ground_is_seen():
     assert (found & on).sum() / found.sum() > 0.95
 
 
+def test_the_edge_of_a_trough_of_whose_top_little_is_seen_is_no_rail():
+    """A far scanner sees its face, and on its top a point here and there: each cell sees none or one of them."""
+    rng = np.random.RandomState(22)
+    xyz, on = with_track(flat(12.0, rng=rng, per_m2=12_000), GAUGE, WIDTH)
+    xyz = rough(xyz, rng)
+    beyond = turned(xyz, 0.0)[1] - 1.5 * SPACING
+    trough, face = (beyond > 0) & (beyond < 0.4), (beyond > 0) & (beyond < 0.008)
+    xyz[trough, 2] += 0.12
+    xyz[face, 2] -= rng.uniform(0.0, 0.12, face.sum())
+    seen = on | face | (rng.random_sample(len(xyz)) < 0.006)
+    found = classify_square(xyz[seen], SETTINGS).rail
+    assert found[on[seen]].mean() > 0.95
+    assert not found[trough[seen]].any()
+
+
 @pytest.mark.parametrize("left", [SPACING / 2 - WIDTH - 0.045, SPACING / 2 + 0.4])
 def test_guard_and_third_rails_go_and_rails_stay(left):
     rng = np.random.RandomState(5)
