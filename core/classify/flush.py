@@ -112,8 +112,9 @@ def flush_rails(shape: tuple[int, int], near: NearBed, grid: Grid, cell: np.ndar
         return NO_FLUSH
     lines = find_lines(marks, REACH_M, STOREY_M, BESIDE_LINE_M)
     lines = lines.of(lines.good(MIN_COVER, MIN_PURE))
-    flat = np.abs(below) < HEAD_LEVEL_M
-    rails = [_at_edge(_grooves(lines, gauge_m), places[flat], head_width_m) for gauge_m in settings.gauges_m]
+    paved = np.isfinite(below)
+    flat = np.abs(below[paved]) < HEAD_LEVEL_M
+    rails = [_at_edge(_grooves(lines, gauge_m), places[paved], flat, head_width_m) for gauge_m in settings.gauges_m]
     heads = [_guided(one, settings) for one in rails]
     upper = np.flatnonzero((below > -HEAD_LEVEL_M) & (below < FACE_M))
     points = [upper[_on_heads(one, places[upper], below[upper], head_width_m)] for one in heads]
@@ -183,21 +184,25 @@ def _grooves(lines: Lines, gauge_m: float) -> Heads:
     return Heads(lines.of(long), (side[:, None] * lines.across)[long])
 
 
-def _at_edge(grooves: Heads, xyz: np.ndarray, head_width_m: float) -> Heads:
-    """Put the axes of the heads beside the outer edges of the grooves, given level points, (k, 3).
+def _at_edge(grooves: Heads, xyz: np.ndarray, flat: np.ndarray, head_width_m: float) -> Heads:
+    """Put the axes of the heads beside the outer edges of the grooves, given the points of pavements, (k, 3).
 
-    The groove is a gap in what is level. A scanner to one side sees one wall only, and the middle of what it sees in
-    the groove is not the groove's; but the gap begins where the head ends.
+    The groove is a gap in what is level, `flat`, (k,) bool. A scanner to one side sees one wall only, and the middle of
+    what it sees in the groove is not the groove's; but the gap begins where the head ends.
     """
-    if not len(grooves.inward) or not len(xyz):
+    if not len(grooves.inward) or not flat.any():
         return grooves.of(np.zeros(len(grooves.inward), dtype=bool))
-    edge_m = _outer_edges(_summed_along(grooves, _level_counts(grooves, xyz)), head_width_m)
+    level, every = (_summed_along(grooves, counts) for counts in _counts(grooves, xyz, flat))
+    edge_m = _outer_edges(level, every, head_width_m)
     seen = np.isfinite(edge_m)
     return grooves.of(seen).moved(edge_m[seen] - head_width_m / 2)
 
 
-def _level_counts(grooves: Heads, xyz: np.ndarray) -> np.ndarray:
-    """Level points, (k, 3), of the same pavement by distance inwards from each cell of a groove, (n, BINS)."""
+def _counts(grooves: Heads, xyz: np.ndarray, flat: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Count the points, (k, 3), of the same pavement by distance inwards from each cell of a groove, (n, BINS) each.
+
+    Those that are level, `flat`, (k,) bool, come first, and then all of them.
+    """
     axis, inward = grooves.lines.axis, grooves.inward
     reach_m = np.hypot(BIN_M * BINS / 2, SLICE_M)
     near = cKDTree(axis).sparse_distance_matrix(cKDTree(xyz[:, :2]), reach_m, output_type="ndarray")
@@ -208,7 +213,11 @@ def _level_counts(grooves: Heads, xyz: np.ndarray) -> np.ndarray:
     bins = np.floor(np.einsum("ij,ij->i", step, inward[own]) / BIN_M).astype(np.int64) + BINS // 2
     inside = np.abs(np.einsum("ij,ij->i", step, grooves.lines.along[own])) < SLICE_M
     inside &= (bins >= 0) & (bins < BINS)
-    return np.bincount(own[inside] * BINS + bins[inside], minlength=len(axis) * BINS).reshape(-1, BINS)
+    number, size = own * BINS + bins, len(axis) * BINS
+    level, every = (
+        np.bincount(number[chosen], minlength=size).reshape(-1, BINS) for chosen in (inside & flat[other], inside)
+    )
+    return level, every
 
 
 def _summed_along(grooves: Heads, counts: np.ndarray) -> np.ndarray:
@@ -223,10 +232,11 @@ def _summed_along(grooves: Heads, counts: np.ndarray) -> np.ndarray:
     return csr_matrix((np.ones(len(rows)), (rows, columns)), shape=(len(axis), len(axis))) @ counts
 
 
-def _outer_edges(counts: np.ndarray, head_width_m: float) -> np.ndarray:
+def _outer_edges(counts: np.ndarray, every: np.ndarray, head_width_m: float) -> np.ndarray:
     """Distance inwards at which the gap that is nearest to the middle begins, (n,) metres; NaN where there is none.
 
-    Nor is there one where less than half of a head beside it is level: at the foot of a wall, or of a slope.
+    Given are the level points and all points in each bin, (n, BINS). Nor is there one where less than half of a head
+    beside it is level, by most of its points: at the foot of a wall, or of a slope.
     """
     limit = GAP_SHARE * np.quantile(counts, LEVEL_QUANTILE, axis=1)[:, None]
     level, number, middle = counts >= np.maximum(limit, 1), np.arange(BINS), BINS // 2
@@ -235,7 +245,8 @@ def _outer_edges(counts: np.ndarray, head_width_m: float) -> np.ndarray:
     head = np.max(np.where(level & (number < gap[:, None]), number, -1), axis=1)
     rows = np.arange(len(counts))
     on_head = (number <= head[:, None]) & (number > head[:, None] - head_width_m / BIN_M)
-    found = (far[rows, gap] <= SEARCH_BINS) & (2 * (level & on_head).sum(axis=1) > on_head.sum(axis=1))
+    flat = on_head & level & (2 * counts > every)
+    found = (far[rows, gap] <= SEARCH_BINS) & (2 * flat.sum(axis=1) > on_head.sum(axis=1))
     high, low = counts[rows, head], counts[rows, np.minimum(head + 1, BINS - 1)]
     share = (high - limit[:, 0]) / np.maximum(high - low, 1)
     return np.where(found, (head - middle + 0.5 + share) * BIN_M, np.nan)

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from rail_extract.core.classify.settings import Settings
 from rail_extract.core.classify.square import classify_square
-from rail_extract.laboratory.scenes.raw_shapes import flat, turned
+from rail_extract.laboratory.scenes.raw_shapes import MIDDLE, flat, turned
 
 GAUGE, WIDTH, GROOVE, DEPTH = 1.435, 0.072, 0.042, 0.045
 SETTINGS = Settings((GAUGE,), WIDTH)
@@ -90,6 +90,21 @@ def test_hollows_at_the_feet_of_two_walls_are_not_grooves():
     xyz[outside, 2] += rng.uniform(0.0, 0.75, outside.sum())
     wall = outside & (inside > -0.012) | ~outside
     assert not classify_square(xyz[wall], SETTINGS).rail.any()
+
+
+def test_a_paved_strip_between_a_slope_and_a_parapet_has_no_grooves():
+    """Beside both, the bed bends up, so that the strip, 1.58 m wide, seems to fall towards its sides."""
+    rng, angle = np.random.RandomState(5), 0.2
+    xyz = flat(8.0, rng=rng, per_m2=600)
+    beyond = np.abs(turned(xyz, angle)[1]) - 0.79
+    left = turned(xyz, angle)[1] > 0
+    xyz[~left, 2] += 0.65 * np.clip(beyond[~left], 0.0, 1.0)
+    xyz[:, 2] += 0.004 * rng.standard_normal(len(xyz))
+    face = flat(8.0, rng=rng, per_m2=90)
+    along, across = turned(face, angle)[0], 0.79 + 0.004 * rng.standard_normal(len(face))
+    face = np.column_stack([along, across, rng.uniform(0.0, 1.5, len(face))])
+    face[:, :2] = MIDDLE + face[:, :2] @ [[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]]
+    assert not classify_square(np.concatenate([xyz[~left | (beyond < 0)], face]), SETTINGS).rail.any()
 
 
 def test_the_side_of_a_vehicle_at_gauge_from_a_groove_is_no_rail():
