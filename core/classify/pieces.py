@@ -8,7 +8,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from .lines import Lines
-from .tops import HIGH_M, Band, Tops
+from .tops import HIGH_M, Tops
 
 ALIGNED_M = 0.03
 """Two cells continue each other if the axis of each passes the other one this close."""
@@ -146,20 +146,20 @@ def shares_of_length(lines: Lines, half_m: float) -> np.ndarray:
 
 
 def stands_free(
-    tops: Tops, band: Band, marks: np.ndarray, lines: Lines, slope: np.ndarray, pairs: np.ndarray
+    tops: Tops, depth_m: np.ndarray, marks: np.ndarray, lines: Lines, slope: np.ndarray, pairs: np.ndarray
 ) -> np.ndarray:
     """Return which lines of cells, `marks`, have lower ground, or nothing seen, on each side, (n,) bool.
 
-    Lower than a plane through the line, that is, with this `slope` to the left, (n,), height per length. Each cell
-    decides with those that continue it, `pairs`, (m, 2): in a thin cloud, or where the scanner is far, a cell alone
-    sees one place of what is beside it, or none.
+    Lower by `depth_m`, (n,), than a plane through the line with this `slope` to the left, (n,), height per length. Each
+    cell decides with those that continue it, `pairs`, (m, 2): in a thin cloud, or where the scanner is far, a cell
+    alone sees one place of what is beside it, or none.
     """
-    seen, high = (_with_continued(counts, lines, pairs) for counts in _seen_beside(tops, band, marks, lines, slope))
+    seen, high = (_with_continued(counts, lines, pairs) for counts in _seen_beside(tops, depth_m, marks, lines, slope))
     return ((2 * high > seen).sum(axis=2) <= MAX_HIGH).all(axis=1)
 
 
 def _seen_beside(
-    tops: Tops, band: Band, marks: np.ndarray, lines: Lines, slope: np.ndarray
+    tops: Tops, depth_m: np.ndarray, marks: np.ndarray, lines: Lines, slope: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Count the places beside each line that are seen, and of these the high ones: (n, 2, distances) each.
 
@@ -167,7 +167,6 @@ def _seen_beside(
     """
     along = np.linspace(-0.5, 0.5, ALONG) * lines.reach_m
     seen, high = (np.zeros((len(lines.axis), 2, len(ACROSS_M)), dtype=np.int64) for _ in range(2))
-    depth_m = band.depth_m(lines.height)
     z, high_cells = tops.z.ravel(), tops.high.ravel()
     own, ahead_m, left_m = z[marks], lines.along, lines.across
     for number, side in enumerate((1, -1)):

@@ -57,6 +57,11 @@ SINGLE_SLOPE = 0.3
 most; at the shoulder of a ballast bed it is 0.67. Where the far side of a slope is hidden, its crest looks like a bar
 on a bed of 0.38 and more."""
 
+SINGLE_DEPTH = 0.4
+"""Share of its height above the bed by which the ground on either side of a rail without a partner is lower. The plane
+of the bed bends at the crest of a bank, which then seems to be high. Measured: 0.31 to 0.35 there, and 0.55 and more
+on rails beside which the ground is seen."""
+
 FLAT_SHARE = 0.5
 """Least share of the points on the width of a head just above the ballast that are in the height of its top: noise of a
 fifth of its height leaves nine of ten, and the crest of a furrow has one of five."""
@@ -359,11 +364,12 @@ def _kept(found: Candidates, bed: Bed, reach_m: float, tolerances: Tolerances, s
     cant = np.einsum("ij,ij->i", bed.gradients(lines.axis), lines.across)
     cant[np.abs(cant) > CANT] = 0.0
     kept = Kept(lines, found.marks[good], np.zeros(len(good), dtype=bool), links(lines))
-    kept = kept.of(_stands_free(kept, cant, found.tops, tolerances.band))
+    kept = kept.of(_stands_free(kept, cant, found.tops, tolerances.band.depth_m(kept.lines.height)))
     kept = replace(kept, paired=_paired(kept.lines, settings, tolerances))
     alone = kept.of(~kept.paired)
     free = kept.paired.copy()  # only a track is canted
-    free[~kept.paired] = _stands_free(alone, np.zeros(len(alone.cell)), found.tops, tolerances.band)
+    depth_m = tolerances.band.depth_m(alone.lines.height)
+    free[~kept.paired] = _stands_free(alone, np.zeros(len(alone.cell)), found.tops, depth_m)
     kept = kept.of(_certain(kept.lines, kept.paired, kept.pairs) & free)
     inside = runs_inside(kept.lines, kept.paired, kept.pairs, settings.gauges_m, settings.head_width_m)
     kept = kept.of(~inside)
@@ -371,9 +377,9 @@ def _kept(found: Candidates, bed: Bed, reach_m: float, tolerances: Tolerances, s
     return kept.of(_long(kept, settings, settings.keep_single, tolerances.least_m))
 
 
-def _stands_free(kept: Kept, slope: np.ndarray, tops: Tops, band: Band) -> np.ndarray:
+def _stands_free(kept: Kept, slope: np.ndarray, tops: Tops, depth_m: np.ndarray | float) -> np.ndarray:
     """Return which cells stand free of what is beside them, (n,) bool; see `pieces.stands_free`."""
-    return stands_free(tops, band, kept.cell, kept.lines, slope, kept.pairs)
+    return stands_free(tops, np.broadcast_to(depth_m, len(kept.cell)), kept.cell, kept.lines, slope, kept.pairs)
 
 
 def _paired(lines: Lines, settings: Settings, tolerances: Tolerances) -> np.ndarray:
@@ -463,9 +469,9 @@ def _are_rails(kept: Kept, beside: Near, shown: Shown, settings: Settings, toler
     """Return which cells of narrow pieces belong to rails, (n,) bool: those with a partner, and some others.
 
     Rails without a partner are as narrow as a head and no narrower, stand as high as a rail does that is not buried in
-    ballast, or as those that have a partner, their bed is not steeper than a track's, they are not guard rails, they
-    overhang, and the other rail may be hidden. `beside` has the points in the height of the heads, and the cells near
-    them.
+    ballast, or as those that have a partner, their bed is not steeper than a track's, the ground beside is lower,
+    they are not guard rails, they overhang, and the other rail may be hidden. `beside` has the points in the height of
+    the heads, and the cells near them.
     """
     partnered = with_partner(kept.pairs, kept.paired)
     if partnered.all():
@@ -481,11 +487,17 @@ def _are_rails(kept: Kept, beside: Near, shown: Shown, settings: Settings, toler
     slope = np.hypot(*shown.bed.gradients(kept.lines.axis).T)
     alone = narrow & high & (mean_of(slope, piece) <= SINGLE_SLOPE)
     alone &= ~_are_guards(kept, piece, partnered, settings)
+    alone &= mean_of(_stand_free_alone(kept, shown.tops), piece) > MAJORITY
     mine = alone[piece] & ~partnered
     lines, (numbers, number) = kept.lines.of(mine), np.unique(piece[mine], return_inverse=True)
     hidden = may_hide_partner(lines, number, shown.tops, settings, tolerances.partner_m)
     alone[numbers] = hidden & ~are_solid(lines, number, shown.xy, shown.height, settings.head_width_m)
     return partnered | alone[piece]
+
+
+def _stand_free_alone(kept: Kept, tops: Tops) -> np.ndarray:
+    """Return which cells have ground beside them that is as low as beside a rail without a partner, (n,) bool."""
+    return _stands_free(kept, np.zeros(len(kept.cell)), tops, SINGLE_DEPTH * kept.lines.height)
 
 
 def _are_guards(kept: Kept, piece: np.ndarray, partnered: np.ndarray, settings: Settings) -> np.ndarray:

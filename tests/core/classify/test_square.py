@@ -91,6 +91,16 @@ def test_the_crest_of_a_slope_whose_far_side_is_hidden_is_not_a_lone_rail(slope,
     assert found.rail.any() == kept
 
 
+def test_the_crest_of_a_bank_that_is_hardly_higher_than_its_ground_is_not_a_lone_rail():
+    """It is 50 mm high; the bed, whose plane bends there, makes it as high as a rail."""
+    rng = np.random.RandomState(1)
+    xyz, _ = with_bar(flat(8.0, rng=rng, per_m2=3000), WIDTH, 0.3, height_m=0.05)
+    left = turned(xyz, 0.3)[1]
+    xyz[:, 2] += 0.003 * rng.standard_normal(len(xyz)) - 0.5 * np.maximum(left - WIDTH / 2, 0.0)
+    seen = (left < 0.06) | ((left < 1.0) & (rng.random_sample(len(xyz)) < 0.1))
+    assert not classify_square(xyz[seen], SETTINGS).rail.any()
+
+
 def test_a_rail_beside_a_shoulder_has_its_partner():
     """The bed under the outer rail is 60 mm lower than under the inner one."""
     rng = np.random.RandomState(15)
