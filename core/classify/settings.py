@@ -73,12 +73,6 @@ BURIED = Band(low_m=0.04, depth_share=0.4, slab_m=0.012, shadows=False)
 """Tops of rails, and those of rails that are buried up to the head. A smooth surface shows these, too; a rough one has
 as much relief anywhere."""
 
-FILLED = Band(low_m=0.02, depth_share=0.5, slab_m=0.012)
-"""Tops of rails in a track that is filled with ballast up to the heads: its stones scatter by 1 cm."""
-
-FILLED_SHARE = 0.25
-"""`Tolerances.below_share` there: stones that count to a head 3 cm above them make it 3 cm wider than it is."""
-
 DENSE = Tolerances(
     along_m=0.035,
     spread_m=0.045,
@@ -115,6 +109,11 @@ BLUNT = replace(DENSE, band=BURIED, least_m=5.0, partner_m=0.05, below_m=0.12, b
 """For clouds that blur a head to a round ridge. Any mound of its width is as round, and up to 4 m of one are opposite
 something else by chance. Beside its crest, the ridge falls by up to 5 cm; noise and a bed that slopes add as much. A
 limit that cut the lower side off would move the line, and one near the mean of the tops would lower it."""
+
+
+FILLED = replace(DENSE, least_m=BLUNT.least_m)
+"""For heads just above the ballast that a track is filled with: as in blunt clouds, up to 4 m of something are at gauge
+from something else by chance."""
 
 
 class Way(Enum):
@@ -162,10 +161,9 @@ class Settings:
         """Return the tolerances for a square that is thin or dense."""
         if self.way is Way.BLUNT:
             return BLUNT
-        usual = THIN if thin else DENSE
         if self.way is Way.FILLED:
-            return replace(usual, band=FILLED, below_share=FILLED_SHARE)
-        return replace(usual, band=replace(HEADS, low_m=self.low_m))
+            return FILLED
+        return replace(THIN if thin else DENSE, band=replace(HEADS, low_m=self.low_m))
 
     @property
     def cell_m(self) -> float:

@@ -8,10 +8,11 @@ import numpy as np
 
 from ..rails import SearchFigures
 from .alone import are_solid, may_hide_partner
-from .bed import COARSE_M, STOREY_M, Bed, Coarse
+from .bed import COARSE_M, Bed, Coarse
 from .flush import NO_FLUSH, Flush, NearBed, flush_rails
 from .labels import Near, label, whole_heads
 from .lines import SINGLE_COVER, Lines, Marks, centred, find_lines, reach_at
+from .low import find_low
 from .partner import MAJORITY, are_within_gauge, have_partners, runs_inside
 from .pieces import (
     LEAST_SINGLE_M,
@@ -27,10 +28,27 @@ from .pieces import (
 )
 from .ridges import LEVEL_M, Ridges, cells_beside, on_crests, steadied
 from .settings import BLUNT, MARGIN_M, Settings, Tolerances, Way
-from .tops import HIGH_M, LOW_M, MILLIMETRES, Band, Grid, Tops, highest_of_blocks, middles_of_tops, narrow_tops, tops_of
+from .tops import (
+    EMPTY,
+    HIGH_M,
+    LOW_M,
+    MILLIMETRES,
+    TOP_M,
+    Band,
+    Grid,
+    Tops,
+    centroids,
+    highest_of_blocks,
+    middles_of_tops,
+    narrow_tops,
+    tops_of,
+)
 
 THIN_PER_M2 = 400.0
 """Points per square metre below which a square is thin: no scanner on a vehicle, or far from it."""
+
+LEAST_DENSE_M2 = 20.0
+"""Area of a square that is not thin without which nothing just above the ballast is seen: 5 m of track."""
 
 DENSITY_QUANTILE = 0.75
 """Quantile, over the coarse cells with candidates, of the points per square metre that stand for the square."""
@@ -57,14 +75,14 @@ SINGLE_SLOPE = 0.3
 most; at the shoulder of a ballast bed it is 0.67. Where the far side of a slope is hidden, its crest looks like a bar
 on a bed of 0.38 and more."""
 
+DEPTH_SHARE = 0.5
+"""Share of its height above the bed by which the ground beside a rail is lower, at most: where a head stands 6 cm out
+of its bed, half of the stones beside it are less than 5 cm below its top."""
+
 SINGLE_DEPTH = 0.4
 """Share of its height above the bed by which the ground on either side of a rail without a partner is lower. The plane
 of the bed bends at the crest of a bank, which then seems to be high. Measured: 0.31 to 0.35 there, and 0.55 and more
 on rails beside which the ground is seen."""
-
-FLAT_SHARE = 0.5
-"""Least share of the points on the width of a head just above the ballast that are in the height of its top: noise of a
-fifth of its height leaves nine of ten, and the crest of a furrow has one of five."""
 
 SHARP_WIDER_M = 0.016
 """Width beyond that of a head up to which a piece shows that the cloud is sharp. Measured over half of the rails of a
@@ -90,6 +108,13 @@ class Shown:
     bed: Bed
     tops: Tops
 
+    def means(self, values: np.ndarray) -> np.ndarray:
+        """Mean value of the points of each cell up to `TOP_M` above the bed, (rows, columns); NaN without any."""
+        low = self.height <= TOP_M
+        found = np.full(self.tops.top.size, np.nan, dtype=np.float32)
+        found[np.unique(self.cell[low])] = centroids(self.cell[low], values[low, None])[:, 0]
+        return found.reshape(self.tops.top.shape)
+
 
 @dataclass(frozen=True)
 class Candidates:
@@ -103,6 +128,13 @@ class Candidates:
     cells: np.ndarray
     marks: np.ndarray
     places: np.ndarray
+
+    @classmethod
+    def of(cls, shown: Shown, cells: np.ndarray) -> Candidates:
+        """Take cells as candidates, at the mean places of all of their points."""
+        places = np.full((shown.tops.top.size, 2), np.nan)
+        places[np.unique(shown.cell)] = centroids(shown.cell, shown.xy)
+        return cls(shown.tops, cells, highest_of_blocks(shown.tops, cells), places)
 
     @classmethod
     def find(cls, shown: Shown, band: Band) -> Candidates:
@@ -164,7 +196,7 @@ def classify_square(xyz: np.ndarray, settings: Settings) -> ByShape:
     if not len(xyz):
         return nothing
     bed, height, level, z = Bed.under(xyz)
-    near = np.flatnonzero(height <= HIGH_M)
+    near = np.flatnonzero(_in_reach(bed, height, level, settings))
     if not len(near):
         return nothing
     height, xy = height[near], xyz[near, :2]
@@ -189,6 +221,15 @@ def classify_square(xyz: np.ndarray, settings: Settings) -> ByShape:
         thin=int(there and standing.thin),
     )
     return ByShape(rail, figures, flush)
+
+
+def _in_reach(bed: Bed, height: np.ndarray, level: np.ndarray, settings: Settings) -> np.ndarray:
+    """Return which points may show rails, (n,) bool, given their heights above the bed and their levels."""
+    in_reach = height <= HIGH_M
+    if settings.way is not Way.FILLED:
+        return in_reach
+    dense_m2 = COARSE_M**2 * np.count_nonzero(bed.coarse.count >= THIN_PER_M2 * COARSE_M**2)
+    return in_reach & (level == 0) & (dense_m2 >= LEAST_DENSE_M2)  # the vault of a tunnel is as rough as ballast
 
 
 @dataclass(frozen=True)
@@ -222,6 +263,8 @@ class Standing:
 
 def _standing(shown: Shown, settings: Settings) -> Standing:
     """Find rails that stand out of their bed: bars as narrow as a head, or the ridges of a blunt cloud."""
+    if settings.way is Way.FILLED:
+        return _on_low(shown, settings)
     band = settings.tolerances(thin=False).band
     found = Candidates.find(shown, band)
     density = _density(shown.bed.coarse, shown.tops.grid.middles(found.marks))
@@ -247,8 +290,6 @@ def _on_bars(
     narrow = (width_m < settings.head_width_m + tolerances.wider_m)[piece]
     kinds = _by_shape(kept, piece, width_m, narrow, shown, settings)
     sharp_m, round_m, unsure_m = (float(share_m[kind].sum()) for kind in kinds)
-    if settings.way is Way.FILLED:
-        narrow &= _are_flat(kept, chosen, shown, settings.head_width_m)
     kept = _with_kept_partners(kept.of(narrow), settings, tolerances)
     beside = Near.find(shown.xy[chosen], kept.lines)
     rails = _are_rails(kept, beside, shown, settings, tolerances)
@@ -270,16 +311,42 @@ def _on_ridges(kept: Kept, thin: bool, shown: Shown, settings: Settings) -> Stan
         blur_m = ridges.blur_m
         heads = ridges.may_be_heads(settings.head_width_m)
         heads &= mean_of(kept.lines.cover, piece) >= SINGLE_COVER  # sleepers show gaps in images, and rails none
-        heads &= are_within_gauge(steadied(kept.lines), piece, settings.spacings_m, LEVEL_M)
-        kept = kept.of(heads[piece])
-        kept = replace(kept, paired=_paired(kept.lines, settings, BLUNT))
-        kept = kept.of(_long(kept, settings, False, BLUNT.least_m))
+        kept = _fitting(kept, piece, heads, settings, BLUNT)
         kept = replace(kept, lines=on_crests(shown.xy, shown.height, kept.lines, blur_m))
     cells = cells_beside(shown.tops.grid, kept.lines, settings.head_width_m / 2 + BLUNT.beside_m)
     chosen = label(shown.tops, cells, shown.cell, shown.height, BLUNT)
     beside = Near.find(shown.xy[chosen], kept.lines)
     every = np.ones(len(kept.cell), dtype=bool)
     return replace(_wanted(kept, every, chosen, beside, thin, settings, BLUNT), blur_m=blur_m)
+
+
+def _on_low(shown: Shown, settings: Settings) -> Standing:
+    """Find heads that stand just out of the ballast: lines above both sides, as wide as a head and with a partner."""
+    grid, tolerances = shown.tops.grid, settings.tolerances(thin=False)
+    low = find_low(grid, shown.means(shown.height))
+    rise = np.where(np.isfinite(low.rise), np.round(low.rise * MILLIMETRES), EMPTY).astype(np.int16)
+    above = (shown.height - np.nan_to_num(low.base).ravel()[shown.cell]).astype(np.float32)
+    shown = replace(shown, height=above, tops=replace(shown.tops, top=rise))
+    found = Candidates.of(shown, np.flatnonzero(low.crest))
+    density = _density(shown.bed.coarse, grid.middles(found.marks))
+    kept = _with_pairs(_on_lines(found, reach_at(density), tolerances, settings), settings, tolerances)
+    kept = _on_rails(kept, np.ones(len(kept.cell), dtype=bool), settings, tolerances)
+    kept = kept.of(with_partner(kept.pairs, kept.paired))
+    if len(kept.cell):
+        piece = pieces_of(len(kept.cell), kept.pairs)
+        width_m = Ridges.measure(shown.xy, shown.height, kept.lines, piece).width_m
+        too_wide = width_m >= settings.head_width_m + tolerances.wider_m  # where one side is hidden, this is not known
+        kept = _fitting(kept, piece, ~too_wide, settings, tolerances)
+    chosen = label(shown.tops, whole_heads(shown.tops, kept.cell, tolerances), shown.cell, shown.height, tolerances)
+    beside = Near.find(shown.xy[chosen], kept.lines)
+    return _wanted(kept, np.ones(len(kept.cell), dtype=bool), chosen, beside, False, settings, tolerances)
+
+
+def _fitting(kept: Kept, piece: np.ndarray, heads: np.ndarray, settings: Settings, tolerances: Tolerances) -> Kept:
+    """Keep the pieces, of (n,) cells, that may be heads, (pieces,) bool, and are at gauge from another one."""
+    heads = heads & are_within_gauge(steadied(kept.lines), piece, settings.spacings_m, LEVEL_M)
+    kept = _with_pairs(kept.of(heads[piece]), settings, tolerances)
+    return kept.of(_long(kept, settings, False, tolerances.least_m))
 
 
 def _wanted(
@@ -356,25 +423,44 @@ def _density(coarse: Coarse, xy: np.ndarray) -> float:
 
 
 def _kept(found: Candidates, bed: Bed, reach_m: float, tolerances: Tolerances, settings: Settings) -> Kept:
-    """Keep the candidates that lie on rails."""
+    """Keep the candidates that lie on rails and stand free of what is beside them."""
+    kept = _on_lines(found, reach_m, tolerances, settings)
+    cant = np.einsum("ij,ij->i", bed.gradients(kept.lines.axis), kept.lines.across)
+    cant[np.abs(cant) > CANT] = 0.0
+    kept = kept.of(_stands_free(kept, cant, found.tops, _depth_m(kept, tolerances)))
+    kept = _with_pairs(kept, settings, tolerances)
+    alone = kept.of(~kept.paired)
+    free = kept.paired.copy()  # only a track is canted
+    free[~kept.paired] = _stands_free(alone, np.zeros(len(alone.cell)), found.tops, _depth_m(alone, tolerances))
+    return _on_rails(kept, free, settings, tolerances)
+
+
+def _on_lines(found: Candidates, reach_m: float, tolerances: Tolerances, settings: Settings) -> Kept:
+    """Keep the candidates that lie on lines; which have partners is not known yet."""
     lines = find_lines(found.at(found.marks), reach_m, tolerances.along_m, tolerances.beside_line_m)
     good = lines.good()
     half_m = settings.head_width_m / 2 + NOISE_ACROSS_M
     lines = centred(lines.of(good), found.at(found.cells), half_m, tolerances.along_m)
-    cant = np.einsum("ij,ij->i", bed.gradients(lines.axis), lines.across)
-    cant[np.abs(cant) > CANT] = 0.0
-    kept = Kept(lines, found.marks[good], np.zeros(len(good), dtype=bool), links(lines))
-    kept = kept.of(_stands_free(kept, cant, found.tops, tolerances.band.depth_m(kept.lines.height)))
-    kept = replace(kept, paired=_paired(kept.lines, settings, tolerances))
-    alone = kept.of(~kept.paired)
-    free = kept.paired.copy()  # only a track is canted
-    depth_m = tolerances.band.depth_m(alone.lines.height)
-    free[~kept.paired] = _stands_free(alone, np.zeros(len(alone.cell)), found.tops, depth_m)
+    return Kept(lines, found.marks[good], np.zeros(len(good), dtype=bool), links(lines))
+
+
+def _on_rails(kept: Kept, free: np.ndarray, settings: Settings, tolerances: Tolerances) -> Kept:
+    """Keep cells that stand free, (n,) bool, unless they belong to guard rails, feet of rails, or short pieces."""
     kept = kept.of(_certain(kept.lines, kept.paired, kept.pairs) & free)
     inside = runs_inside(kept.lines, kept.paired, kept.pairs, settings.gauges_m, settings.head_width_m)
     kept = kept.of(~inside)
     kept = kept.of(~lower_than_beside(kept.lines, tolerances.spread_m))
     return kept.of(_long(kept, settings, settings.keep_single, tolerances.least_m))
+
+
+def _with_pairs(kept: Kept, settings: Settings, tolerances: Tolerances) -> Kept:
+    """Find out which cells have a partner."""
+    return replace(kept, paired=_paired(kept.lines, settings, tolerances))
+
+
+def _depth_m(kept: Kept, tolerances: Tolerances) -> np.ndarray:
+    """Return how far below each line what is beside it must be, (n,) metres."""
+    return np.minimum(tolerances.band.depth_m(kept.lines.height), DEPTH_SHARE * kept.lines.height)
 
 
 def _stands_free(kept: Kept, slope: np.ndarray, tops: Tops, depth_m: np.ndarray | float) -> np.ndarray:
@@ -443,26 +529,6 @@ def _by_shape(
         rounded = rounded & (spread_m > settings.head_width_m / 2)[piece]
         unsure = unsure & narrow & (spread_m <= settings.head_width_m / 2)[piece]
     return sharp, rounded, unsure
-
-
-def _are_flat(kept: Kept, chosen: np.ndarray, shown: Shown, head_width_m: float) -> np.ndarray:
-    """Return which cells belong to pieces with flat tops, (n,) bool, given the points in the height of their tops.
-
-    The vault of a tunnel, which has a level of its own above the track, does not count. They hold as many points as the
-    heads of a square that is not thin: a few may be level by chance.
-    """
-    if not len(kept.cell):
-        return np.zeros(0, dtype=bool)
-    piece, near = pieces_of(len(kept.cell), kept.pairs), Near.find(shown.xy, kept.lines)
-    place, nearest = np.unique(near.place, return_index=True)
-    inside = np.abs(near.across[nearest]) <= head_width_m / 2
-    inside &= np.abs(shown.z[place] - shown.tops.z.ravel()[kept.cell[near.cell[nearest]]]) < STOREY_M
-    number = piece[near.cell[nearest[inside]]]
-    every, level = (
-        np.bincount(number, np.isin(place[inside], which), int(piece.max()) + 1) for which in (place, chosen)
-    )
-    dense = every >= THIN_PER_M2 * head_width_m * lengths(kept.lines.axis, piece)
-    return (dense & (level >= FLAT_SHARE * every))[piece]
 
 
 def _are_rails(kept: Kept, beside: Near, shown: Shown, settings: Settings, tolerances: Tolerances) -> np.ndarray:

@@ -1,8 +1,8 @@
 """The way in which a cloud is searched: one for all of it, because it follows from the scanner and the railway.
 
 Rails are the only things of known width. A cloud that shows some of them as narrow as their heads is sharp, whatever
-else it shows, and one that shows round ones only is blunt. One that shows none has tracks that are filled with ballast
-up to the heads, or no tracks. Of several sources, scanners and cameras, each is sharp or blunt
+else it shows, and one that shows round ones only is blunt. One that shows hardly any has tracks that are filled with
+ballast up to the heads, or no tracks. Of several sources, scanners and cameras, each is sharp or blunt
 (docs/classification.md).
 """
 
@@ -20,9 +20,6 @@ SHARP_M = 20.0
 
 BLUNT_M = 100.0
 """Length of round rails that shows a cloud without these to be blunt; the rest of it need not be seen."""
-
-STRAY_M = 5.0
-"""Length of rails up to which a cloud shows none: shorter ones are strays."""
 
 CLEAR = 5.0
 """How much longer narrow rails are than round ones in a source that is certainly sharp, and round ones than narrow ones
@@ -101,9 +98,9 @@ def blunt_sources(
     return blunt_among(seen)
 
 
-def shows_no_rails(seen: SearchFigures) -> bool:
-    """Return whether a cloud shows strays at most, by the sum of the figures of all of its parts."""
-    return seen.paired_m + seen.single_m < STRAY_M
+def length_m(seen: SearchFigures) -> float:
+    """Return the length of the rails of a cloud, by the sum of the figures of its parts."""
+    return seen.paired_m + seen.single_m
 
 
 def search_alike(parts: Sequence[Part], search: Callable[[Sequence[Part], Way], Iterable[Answer]]) -> Iterator[Answer]:
@@ -117,8 +114,10 @@ def search_alike(parts: Sequence[Part], search: Callable[[Sequence[Part], Way], 
         done, found = done + len(batch), found + answers
     if is_blunt(seen):
         yield from search(parts, Way.BLUNT)
-    elif done == len(parts) and shows_no_rails(seen):
-        yield from search(parts, Way.FILLED)
+    elif not is_decided(seen):
+        filled = list(search(parts, Way.FILLED))
+        more = length_m(sum((answer.figures for answer in filled), SearchFigures())) > max(length_m(seen), SHARP_M)
+        yield from filled if more else found
     else:
         yield from found
         yield from search(parts[done:], Way.SHARP)

@@ -15,18 +15,23 @@ from scipy.special import ndtr
 
 
 class Found(NamedTuple):
-    part: tuple[float, float]
+    part: tuple[float, ...]
     way: Way
     figures: SearchFigures
 
 
 def ways(*parts):
-    """Search parts with lengths of sharp and of round rails, and return in which way each was searched at last."""
+    """Search parts and return in which way each was searched at last.
+
+    They have lengths of sharp, of round, and of filled rails.
+    """
 
     def search(some, way):
-        for sharp_m, round_m in some:
+        for part in some:
+            sharp_m, round_m, *filled_m = part
             seen = SearchFigures(paired_m=sharp_m + round_m, sharp_m=sharp_m, round_m=round_m)
-            yield Found((sharp_m, round_m), way, seen if way is Way.SHARP else SearchFigures())
+            filled = SearchFigures(paired_m=sum(filled_m))
+            yield Found(part, way, {Way.SHARP: seen, Way.FILLED: filled}.get(way, SearchFigures()))
 
     found = list(search_alike(parts, search))
     assert [one.part for one in found] == list(parts)
@@ -40,11 +45,14 @@ def ways(*parts):
         ([(80.0, 0.6), (0.0, 90.0)], Way.SHARP),
         ([(0.0, 80.0)] * 9, Way.BLUNT),
         ([(2.0, 80.0)] * 9, Way.BLUNT),
-        ([(0.0, 0.0)] * 9, Way.FILLED),
+        ([(0.0, 0.0, 0.0)] * 9, Way.SHARP),
+        ([(0.0, 0.0, 2.0)] * 9, Way.SHARP),
+        ([(0.0, 0.0, 90.0)] * 9, Way.FILLED),
         ([(0.0, 0.0)] * 7 + [(0.0, 12.0)], Way.BLUNT),
         ([(0.0, 0.0)] * 7 + [(12.0, 3.0)], Way.SHARP),
-        ([(0.0, 0.0)] * 7 + [(3.0, 1.0)], Way.FILLED),
-        ([], Way.FILLED),
+        ([(0.0, 0.0)] * 7 + [(12.0, 3.0, 80.0)], Way.FILLED),
+        ([(0.0, 0.0, 80.0)] * 7 + [(30.0, 3.0, 80.0)], Way.SHARP),
+        ([], Way.SHARP),
     ],
 )
 def test_all_parts_are_searched_in_one_way(parts, way):
@@ -91,31 +99,49 @@ def test_the_blur_is_that_of_rails():
     assert figures.blur_m == pytest.approx(0.062, rel=0.2)
 
 
-def filled_track(share: float, per_m2: int) -> np.ndarray:
-    """Two heads 3 cm above ballast, with points per square metre; a share of those of heads is on top, others below."""
+def filled_track(
+    rise_m: float, per_m2: int, width_m: float = 0.072, shoulder_m: float = 0.0, rough_m: float = 0.008
+) -> np.ndarray:
+    """Two heads above rough ballast, with points per square metre; beyond them, a shoulder may fall or rise."""
     rng = np.random.RandomState(6)
     xy = rng.uniform(0.0, 16.0, (16 * 16 * per_m2, 2))
-    on = np.abs(np.abs(xy[:, 0] - 7.0) - (1.435 + 0.072) / 2) < 0.036
-    top = on & (rng.uniform(size=len(xy)) < share)
-    z = np.where(top, 0.03, 0.008 * rng.standard_normal(len(xy))) + 0.003 * rng.standard_normal(len(xy))
+    off_m = np.abs(xy[:, 0] - 7.0) - (1.435 + 0.072) / 2
+    z = np.where(np.abs(off_m) < width_m / 2, rise_m, rough_m * rng.standard_normal(len(xy)))
+    z += np.where(off_m > 0.4, shoulder_m, 0.0) + 0.003 * rng.standard_normal(len(xy))
     return np.column_stack([xy, z])
 
 
+def searched(xyz: np.ndarray, way: Way) -> SearchFigures:
+    return classify_square(xyz, Settings((1.435,), 0.072, way=way)).figures
+
+
 @pytest.mark.parametrize(
-    ("share", "per_m2", "found_m"), [(1.0, 900, 2 * 16.0), (0.3, 900, 0.0), (0.45, 3000, 0.0), (1.0, 250, 0.0)]
+    ("track", "found_m"),
+    [
+        (filled_track(0.03, 900), 2 * 16.0),
+        (filled_track(0.015, 900), 2 * 16.0),
+        (filled_track(0.02, 900, shoulder_m=-0.10), 2 * 16.0),
+        (filled_track(0.03, 900, shoulder_m=0.08), 2 * 16.0),
+        (filled_track(0.0, 900), 0.0),
+        (filled_track(0.03, 900, width_m=0.14), 0.0),
+        (filled_track(0.03, 250), 0.0),
+    ],
+    ids=["3 cm", "1.5 cm", "beside a step down", "beside a heap", "none", "boards", "thin"],
 )
-def test_heads_just_above_the_ballast_are_flat(share, per_m2, found_m):
-    xyz = filled_track(share, per_m2)
-    figures = [classify_square(xyz, Settings((1.435,), 0.072, way=way)).figures for way in (Way.SHARP, Way.FILLED)]
-    assert figures[0].paired_m == 0
-    assert figures[1].paired_m == figures[1].filled_m == pytest.approx(found_m, abs=1.0)
+def test_heads_just_above_the_ballast_are_above_both_sides_and_as_wide_as_heads(track, found_m):
+    assert searched(track, Way.SHARP).paired_m == 0
+    figures = searched(track, Way.FILLED)
+    assert figures.paired_m == figures.filled_m == pytest.approx(found_m, abs=3.0)  # lines end in the cloud
 
 
-def test_heads_just_above_the_ballast_are_flat_under_the_vault_of_a_tunnel():
-    vault = filled_track(0.0, 1800) + [0.0, 0.0, 7.0]
-    tunnel = np.concatenate([filled_track(1.0, 900), vault])
-    figures = classify_square(tunnel, Settings((1.435,), 0.072, way=Way.FILLED)).figures
-    assert figures.filled_m == pytest.approx(2 * 16.0, abs=1.0)
+def test_beside_a_head_that_stands_low_the_ground_is_lower_by_half_its_height():
+    """Beside one of 4.5 cm, no stone is as much below its top as beside one of 15 cm."""
+    assert searched(filled_track(0.045, 1500, rough_m=0.01), Way.SHARP).paired_m == pytest.approx(2 * 16.0, abs=1.0)
+
+
+def test_heads_just_above_the_ballast_are_seen_under_the_vault_of_a_tunnel():
+    tunnel = np.concatenate([filled_track(0.03, 900), filled_track(0.0, 1800) + [0.0, 0.0, 7.0]])
+    assert searched(tunnel, Way.FILLED).filled_m == pytest.approx(2 * 16.0, abs=3.0)
 
 
 SHARP, ROUND, NOTHING = (30.0, 2.0), (0.5, 60.0), (0.0, 0.0)

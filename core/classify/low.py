@@ -1,0 +1,179 @@
+"""Heads that stand just out of a rough bed, by what is higher than both of its sides over more than a metre.
+
+The stones of a track that is filled with ballast scatter by as much as its heads stand out, but a line of some twenty
+cells averages them. How much its mean differs from those beside it is therefore compared with what the cells scatter.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.ndimage import uniform_filter
+
+from .tops import WINDOW_M, Grid
+
+DOUBLINGS = 5
+"""A line has 2 to this power of cells, 1.3 m: arcs of 25 m bend by 8 mm over it, and ties and stones alternate."""
+
+DIRECTIONS = 24
+"""Directions of lines, 7.5 degrees apart: one between two of them is half a head off at its ends."""
+
+BESIDE_M = (0.11, 0.15, 0.19)
+"""Distances of the lines on a side from the line between them: from beyond the head to the next head or its foot."""
+
+LEAST_CELLS = 3
+"""Cells with points that a line must have, and twice as many on each side: profiles of a scanner are up to 0.2 m
+apart."""
+
+SURFACE_M = (np.inf, 0.05, 0.03)
+"""Distances from the surface within which cells count towards it, round by round: the scatter of ballast, and short of
+a step at the ends of sleepers."""
+
+CLIPPED_M = 0.04
+"""What is this far from the surface is no further: steps and weeds would make the scatter larger than the ballast's."""
+
+NOISE_M = 0.003
+"""Least scatter of the cells of a line, the noise of a scanner: a few cells may be level by chance."""
+
+CERTAIN = 4.5
+"""Least rise of a line by its standard error: chance is a third of it over all directions, and rails twice of it."""
+
+CREST_CELLS = 2
+"""Cells to either side than which a crest is not lower: a head is as wide."""
+
+RISE_M = 0.006
+"""Least rise of a line: pavements wear to as much, and heads of less are in a pavement themselves."""
+
+
+@dataclass(frozen=True)
+class Low:
+    """What lines through cells show, (rows, columns) arrays.
+
+    `rise` is how far the line is above the higher one of its sides, metres, in the direction in which this is most
+    certain, and `base` the height of this side above the bed; NaN where no line is seen. `crest` says which cells may
+    be on a head: the line is certainly above its sides, and more so than those beside it.
+    """
+
+    rise: np.ndarray
+    base: np.ndarray
+    crest: np.ndarray
+
+
+def find_low(grid: Grid, level: np.ndarray) -> Low:
+    """Find the lines that stand out, given the mean height of each cell above the bed; NaN without points."""
+    surface = _surface(level, grid)
+    level = np.clip(level - surface, -CLIPPED_M, CLIPPED_M)
+    certain, rise, base, direction = _most_certain(level, grid.cell_m)
+    crest = np.isfinite(level) & (certain >= CERTAIN) & (np.nan_to_num(rise) >= RISE_M)
+    return Low(rise, base + surface, crest & _are_crests(certain, direction))
+
+
+def _surface(level: np.ndarray, grid: Grid) -> np.ndarray:
+    """Mean height of the cells around each cell, without those that are far from it, (rows, columns)."""
+    size = 2 * round(WINDOW_M / grid.cell_m) + 1
+    surface = np.zeros(level.shape)
+    for limit_m in SURFACE_M:
+        near = np.abs(np.nan_to_num(level - surface, nan=np.inf)) < limit_m
+        share, total = (
+            uniform_filter(values, size, mode="constant") for values in (near.astype(float), np.where(near, level, 0.0))
+        )
+        surface = np.where(share * size**2 > 0.5, total / np.maximum(share, 0.5 / size**2), surface)
+    return surface
+
+
+def _most_certain(level: np.ndarray, cell_m: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Compare the line through each cell with those beside it, in the direction in which it is most certainly higher.
+
+    Returns, (rows, columns) each, the rise by its standard error, the rise, the height of the higher side, and the
+    number of the direction; 0, NaN, NaN and 0 where no line is seen.
+    """
+    seen = np.isfinite(level)
+    value = np.where(seen, level, 0.0)
+    images = np.stack([seen, value, value * value]).astype(np.float32)
+    certain, direction = np.zeros(level.shape, dtype=np.float32), np.zeros(level.shape, dtype=np.int8)
+    rise, base = np.full_like(certain, np.nan), np.full_like(certain, np.nan)
+    for number in range(DIRECTIONS):
+        down, right = _step(number)
+        line = Sample(*_along(images, down, right))
+        sides = [Sample(*_beside(line, side * right / cell_m, -side * down / cell_m)) for side in (1, -1)]
+        least = np.min([line.certainly_above(side) for side in sides], axis=0)
+        better = least > certain
+        certain[better], direction[better] = least[better], number
+        base[better] = np.max([side.mean for side in sides], axis=0)[better]
+        rise[better] = line.mean[better] - base[better]
+    return certain, rise, base, direction
+
+
+def _step(number: int) -> tuple[float, float]:
+    """Rows and columns from one cell of a line to the next one, in a direction."""
+    angle = np.pi * number / DIRECTIONS
+    return -float(np.sin(angle)), float(np.cos(angle))
+
+
+@dataclass(frozen=True)
+class Sample:
+    """Cells with points around each cell: their count, the sum of their heights, and that of the squares of these."""
+
+    count: np.ndarray
+    total: np.ndarray
+    squares: np.ndarray
+
+    @cached_property
+    def mean(self) -> np.ndarray:
+        """Mean height."""
+        return self.total / np.maximum(self.count, 1)
+
+    @cached_property
+    def scatter(self) -> np.ndarray:
+        """Sum of squares of the distances from the mean."""
+        return np.maximum(self.squares - self.count * self.mean**2, 0)
+
+    def certainly_above(self, side: Sample) -> np.ndarray:
+        """How much higher the mean of a line is than that of its side, by standard errors; 0 if too little is seen."""
+        freedom = np.maximum(self.count + side.count - 2, 1)
+        variance = np.maximum((self.scatter + side.scatter) / freedom, NOISE_M**2)
+        error = np.sqrt(variance * (1 / np.maximum(self.count, 1) + 1 / np.maximum(side.count, 1)))
+        enough = (self.count > LEAST_CELLS - 0.5) & (side.count > 2 * LEAST_CELLS - 0.5)
+        return np.where(enough, (self.mean - side.mean) / error, 0.0)
+
+
+def _along(images: np.ndarray, down: float, right: float) -> np.ndarray:
+    """Sum images, (k, rows, columns), along a line through each cell: sums of 1, 2, 4 … cells add up."""
+    total, length = images, 1
+    for _ in range(DOUBLINGS):
+        total = total + _moved(total, length * down, length * right)
+        length *= 2
+    return _moved(total, -(length - 1) / 2 * down, -(length - 1) / 2 * right)
+
+
+def _beside(line: Sample, down: float, right: float) -> list[np.ndarray]:
+    """Sum the lines on one side of each cell, a metre of which is as many rows down and columns to the right."""
+    return [
+        np.sum([_moved(values, beside_m * down, beside_m * right) for beside_m in BESIDE_M], axis=0)
+        for values in (line.count, line.total, line.squares)
+    ]
+
+
+def _moved(image: np.ndarray, down: float, right: float) -> np.ndarray:
+    """Put at each cell the value of the one `down` rows below and `right` columns to the right; 0 beyond the border."""
+    (rows, columns), (row, column) = image.shape[-2:], (round(down), round(right))
+    moved = np.zeros_like(image)
+    if abs(row) < rows and abs(column) < columns:
+        moved[..., max(-row, 0) : rows - max(row, 0), max(-column, 0) : columns - max(column, 0)] = image[
+            ..., max(row, 0) : rows - max(-row, 0), max(column, 0) : columns - max(-column, 0)
+        ]
+    return moved
+
+
+def _are_crests(certain: np.ndarray, direction: np.ndarray) -> np.ndarray:
+    """Return which cells are more certainly above their sides than those within `CREST_CELLS` across, bool."""
+    crests = np.ones(certain.shape, dtype=bool)
+    for number in range(DIRECTIONS):
+        down, right = _step(number)
+        chosen = direction == number
+        for cells in range(1, CREST_CELLS + 1):
+            for side in (cells, -cells):
+                crests &= ~chosen | (certain >= _moved(certain, side * right, -side * down))
+    return crests

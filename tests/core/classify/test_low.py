@@ -1,0 +1,58 @@
+"""Lines that stand out of a rough bed."""
+
+import numpy as np
+import pytest
+from rail_extract.core.classify.low import find_low
+from rail_extract.core.classify.tops import Grid
+
+CELL_M, SIDE = 0.04, 120
+SCATTER_M = 0.01
+ROW, COLUMN = np.indices((SIDE, SIDE))
+
+
+def bed(seen: float = 0.6, seed: int = 3) -> np.ndarray:
+    """Make rough ballast of which a share of the cells is seen."""
+    rng = np.random.RandomState(seed)
+    level = SCATTER_M * rng.standard_normal((SIDE, SIDE))
+    return np.where(rng.uniform(size=level.shape) < seen, level, np.nan)
+
+
+def off_m(degrees: float) -> np.ndarray:
+    """Distance of each cell to the left of a line through the middle."""
+    x, y = (COLUMN - SIDE / 2) * CELL_M, (SIDE / 2 - ROW) * CELL_M
+    angle = np.radians(degrees)
+    return y * np.cos(angle) - x * np.sin(angle)
+
+
+def found(level: np.ndarray):
+    return find_low(Grid(CELL_M, 0, 0, level.shape), level)
+
+
+@pytest.mark.parametrize("degrees", [0.0, 20.0, 57.0, 90.0, 139.0])
+def test_a_head_of_any_direction_is_a_crest(degrees):
+    on = np.abs(off_m(degrees)) < 0.036
+    level = np.where(np.isnan(bed()), np.nan, np.where(on, 0.02, bed()))
+    low = found(level)
+    inner = (np.hypot(ROW - SIDE / 2, COLUMN - SIDE / 2) < 0.4 * SIDE) & low.crest
+    assert (np.abs(off_m(degrees))[inner] < 0.06).mean() > 0.95
+    assert inner.sum() > 0.4 * 0.8 * SIDE
+    assert np.median(low.rise[inner]) == pytest.approx(0.017, abs=0.004)
+    assert np.median(low.base[inner]) == pytest.approx(0.0, abs=0.006)
+
+
+def test_rough_ballast_has_hardly_a_crest():
+    assert found(bed()).crest.mean() < 0.001
+
+
+def test_a_slope_hides_no_head():
+    on = np.abs(off_m(30.0)) < 0.036
+    level = np.where(on, 0.025, bed()) + 0.12 * off_m(30.0)
+    low = found(np.where(np.isnan(bed()), np.nan, level))
+    assert (np.abs(off_m(30.0))[low.crest] < 0.06).mean() > 0.9
+    assert low.crest.sum() > 0.4 * SIDE
+
+
+def test_what_is_not_seen_has_no_crest():
+    low = found(np.full((SIDE, SIDE), np.nan))
+    assert not low.crest.any()
+    assert np.isnan(low.rise).all()
