@@ -26,10 +26,6 @@ CLEAR_M = 0.6
 """Empty height below the beginning of a level: less than the thickness of a deck, more than the height of a rail. With
 1.5 m the rails of a bridge that is seen from below as well were lost."""
 
-STOREY_M = 0.3
-"""Difference in height up to which places near each other are of one storey: a wall of a groove, cant and gradient over
-a metre take less, and floors, decks and ceilings are `CLEAR_M` and more apart."""
-
 MAX_LEVELS = 4
 """Levels in one cell, counted from below."""
 

@@ -12,7 +12,7 @@ from scipy.ndimage import binary_dilation, binary_propagation
 from scipy.sparse import csr_matrix
 from scipy.spatial import cKDTree
 
-from .bed import COARSE_M, MAX_LEVELS, STOREY_M
+from .bed import COARSE_M, MAX_LEVELS
 from .lines import Lines, Marks, find_lines
 from .partner import partners
 from .pieces import lengths, links, pieces_of
@@ -39,6 +39,10 @@ INSIDE_M, SPACING_M = 0.052, 0.05
 
 MIN_STATIONS = 3
 """Stations with a partner of five."""
+
+STOREY_M = 0.3
+"""Difference in height up to which places belong to one pavement: a wall of a groove, cant and gradient over a metre
+take less, and floors, decks and ceilings are 0.6 m and more apart."""
 
 MIN_LENGTH_M = 2.0
 """Shortest groove."""

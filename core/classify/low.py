@@ -15,7 +15,7 @@ from scipy.ndimage import uniform_filter
 from .tops import WINDOW_M, Grid
 
 DOUBLINGS = 5
-"""A line has 2 to this power of cells, 1.3 m: arcs of 25 m bend by 8 mm over it, and ties and stones alternate."""
+"""A line has 2 to this power of cells, 1.3 m: arcs of 25 m bend by 8 mm over it, and sleepers and stones alternate."""
 
 DIRECTIONS = 24
 """Directions of lines, 7.5 degrees apart: one between two of them is half a head off at its ends."""
@@ -32,7 +32,7 @@ SURFACE_M = (np.inf, 0.05, 0.03)
 a step at the ends of sleepers."""
 
 CLIPPED_M = 0.04
-"""What is this far from the surface is no further: steps and weeds would make the scatter larger than the ballast's."""
+"""Distance from the surface at which heights are cut off: steps and weeds would add to the scatter of the ballast."""
 
 NOISE_M = 0.003
 """Least scatter of the cells of a line, the noise of a scanner: a few cells may be level by chance."""

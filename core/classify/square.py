@@ -37,8 +37,8 @@ from .tops import (
     Band,
     Grid,
     Tops,
-    centroids,
     highest_of_blocks,
+    means,
     middles_of_tops,
     narrow_tops,
     tops_of,
@@ -99,21 +99,18 @@ a guard rail, the axis would lie between both rails."""
 
 @dataclass(frozen=True)
 class Shown:
-    """What a square shows near its bed: places, (n, 2), of points, and cells, heights above the bed and `z`, (n,)."""
+    """What a square shows near its bed: places, (n, 2), of points, their cells and heights above the bed, (n,)."""
 
     xy: np.ndarray
     cell: np.ndarray
     height: np.ndarray
-    z: np.ndarray
     bed: Bed
     tops: Tops
 
-    def means(self, values: np.ndarray) -> np.ndarray:
-        """Mean value of the points of each cell up to `TOP_M` above the bed, (rows, columns); NaN without any."""
+    def mean_heights(self) -> np.ndarray:
+        """Mean height of the points of each cell up to `TOP_M` above the bed, (rows, columns); NaN without any."""
         low = self.height <= TOP_M
-        found = np.full(self.tops.top.size, np.nan, dtype=np.float32)
-        found[np.unique(self.cell[low])] = centroids(self.cell[low], values[low, None])[:, 0]
-        return found.reshape(self.tops.top.shape)
+        return means(self.tops.top.size, self.cell[low], self.height[low, None]).reshape(self.tops.top.shape)
 
 
 @dataclass(frozen=True)
@@ -132,8 +129,7 @@ class Candidates:
     @classmethod
     def of(cls, shown: Shown, cells: np.ndarray) -> Candidates:
         """Take cells as candidates, at the mean places of all of their points."""
-        places = np.full((shown.tops.top.size, 2), np.nan)
-        places[np.unique(shown.cell)] = centroids(shown.cell, shown.xy)
+        places = means(shown.tops.top.size, shown.cell, shown.xy)
         return cls(shown.tops, cells, highest_of_blocks(shown.tops, cells), places)
 
     @classmethod
@@ -202,7 +198,7 @@ def classify_square(xyz: np.ndarray, settings: Settings) -> ByShape:
     height, xy = height[near], xyz[near, :2]
     grid, cell = Grid.around(xy[:, 0], xy[:, 1], settings.cell_m)
     tops = tops_of(grid, cell, height, z[near])
-    standing = _standing(Shown(xy, cell, height, z[near], bed, tops), settings)
+    standing = _standing(Shown(xy, cell, height, bed, tops), settings)
     near_bed = NearBed(xy, z[near], height, bed.coarse.cell[near], level[near])
     paved = NO_FLUSH if settings.blunt else flush_rails(bed.coarse.shape, near_bed, grid, cell, settings)
     in_pavement = rail.copy()
@@ -323,7 +319,7 @@ def _on_ridges(kept: Kept, thin: bool, shown: Shown, settings: Settings) -> Stan
 def _on_low(shown: Shown, settings: Settings) -> Standing:
     """Find heads that stand just out of the ballast: lines above both sides, as wide as a head and with a partner."""
     grid, tolerances = shown.tops.grid, settings.tolerances(thin=False)
-    low = find_low(grid, shown.means(shown.height))
+    low = find_low(grid, shown.mean_heights())
     rise = np.where(np.isfinite(low.rise), np.round(low.rise * MILLIMETRES), EMPTY).astype(np.int16)
     above = (shown.height - np.nan_to_num(low.base).ravel()[shown.cell]).astype(np.float32)
     shown = replace(shown, height=above, tops=replace(shown.tops, top=rise))
@@ -463,9 +459,9 @@ def _depth_m(kept: Kept, tolerances: Tolerances) -> np.ndarray:
     return np.minimum(tolerances.band.depth_m(kept.lines.height), DEPTH_SHARE * kept.lines.height)
 
 
-def _stands_free(kept: Kept, slope: np.ndarray, tops: Tops, depth_m: np.ndarray | float) -> np.ndarray:
+def _stands_free(kept: Kept, slope: np.ndarray, tops: Tops, depth_m: np.ndarray) -> np.ndarray:
     """Return which cells stand free of what is beside them, (n,) bool; see `pieces.stands_free`."""
-    return stands_free(tops, np.broadcast_to(depth_m, len(kept.cell)), kept.cell, kept.lines, slope, kept.pairs)
+    return stands_free(tops, depth_m, kept.cell, kept.lines, slope, kept.pairs)
 
 
 def _paired(lines: Lines, settings: Settings, tolerances: Tolerances) -> np.ndarray:

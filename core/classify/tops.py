@@ -201,18 +201,22 @@ def middles_of_tops(
     top_m = tops.top.ravel()[cells] / MILLIMETRES
     low[cells] = top_m - band.depth_m(top_m)
     on = np.flatnonzero((height >= low[cell]) & (height <= TOP_M))
-    places = np.full((tops.top.size, 2), np.nan)
-    places[cells] = centroids(cell[on], xy[on])
-    return places
+    return means(tops.top.size, cell[on], xy[on])
+
+
+def means(count: int, cell: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Mean values of the points, (n, d) metres, of each of a `count` of cells, (count, d); NaN without points."""
+    points = np.bincount(cell, minlength=count)
+    # Whole numbers add up to the same sum in any order of the points.
+    tenths = np.round(values * TENTHS_OF_MM)
+    with np.errstate(invalid="ignore"):
+        return np.column_stack([np.bincount(cell, column, count) / points for column in tenths.T]) / TENTHS_OF_MM
 
 
 def centroids(cell: np.ndarray, places: np.ndarray) -> np.ndarray:
     """Mean places of the points, (n, d), of each cell that has any, in the order of the cells, (k, d)."""
     cells, number = np.unique(cell, return_inverse=True)
-    count = np.bincount(number, minlength=len(cells))
-    # Whole numbers add up to the same sum in any order of the points.
-    tenths = np.round(places * TENTHS_OF_MM)
-    return np.column_stack([np.bincount(number, column, len(cells)) / count for column in tenths.T]) / TENTHS_OF_MM
+    return means(len(cells), number, places)
 
 
 def highest_of_blocks(tops: Tops, cells: np.ndarray) -> np.ndarray:
