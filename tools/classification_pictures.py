@@ -19,8 +19,8 @@ import numpy as np  # noqa: E402
 from matplotlib.axes import Axes  # noqa: E402
 from matplotlib.figure import Figure  # noqa: E402
 from pictures import draw_pictures  # noqa: E402
-from rail_extract.core.classify import square  # noqa: E402
-from rail_extract.core.classify.bed import Coarse, find_bed  # noqa: E402
+from rail_extract.core.classify.bed import Bed  # noqa: E402
+from rail_extract.core.classify.cells import Candidates, Kept, Shown, free_standing  # noqa: E402
 from rail_extract.core.classify.lines import Lines, Marks, find_lines  # noqa: E402
 from rail_extract.core.classify.settings import DENSE, HEADS, Settings  # noqa: E402
 from rail_extract.core.classify.tops import (  # noqa: E402
@@ -46,6 +46,10 @@ DPI = 80
 SEED = 4
 
 LENGTH_M, HEADING = 36.0, 0.3
+
+REACH_M = 1.0
+"""Reach of the lines through cells in a dense cloud."""
+
 VIEW_M = (17.0, 31.0), (-3.4, 4.2)
 """Part of the scene that is drawn: along the main track, and to the left of it."""
 
@@ -64,13 +68,13 @@ class Scene:
     height: np.ndarray
     tops: Tops
     marks: np.ndarray
-    kept: square.Kept
+    kept: Kept
 
     @property
     def lines(self) -> Lines:
         """The line through each mark."""
         marks = Marks(self.tops.grid.middles(self.marks), self.tops.top.ravel()[self.marks] / MILLIMETRES)
-        return find_lines(marks, 1.0, DENSE.along_m, DENSE.strip_m)
+        return find_lines(marks, REACH_M, DENSE.along_m, DENSE.beside_line_m)
 
 
 @lru_cache(maxsize=1)
@@ -91,16 +95,13 @@ def scene() -> Scene:
     ]
     raw = scan_world("turnout", tracks, STANDARD, [TRAIN], things, SEED, half_width_m=6.0)
     settings = Settings((STANDARD.gauge_m,), STANDARD.head_width_m)
-    x, y, z = raw.xyz.T
-    coarse = Coarse.around(x, y)
-    bed = find_bed(coarse, *coarse.offsets(x, y), z.astype(np.float32))
-    height, _ = bed.heights(*coarse.offsets(x, y), z.astype(np.float32))
+    under, height, _, z = Bed.under(raw.xyz)
     near = np.flatnonzero(height <= HIGH_M)
-    grid, cell = Grid.around(x[near], y[near], settings.cell_m)
-    tops = tops_of(grid, cell, height[near], z[near].astype(np.float32))
-    shown = square.Shown(raw.xyz[near, :2], cell, height[near], bed, tops)
-    found = square.Candidates.find(shown, HEADS)
-    return Scene(raw, settings, height, tops, found.marks, square._kept(found, 1.0, DENSE, settings))
+    xy = raw.xyz[near, :2]
+    grid, cell = Grid.around(*xy.T, settings.cell_m)
+    tops = tops_of(grid, cell, height[near], z[near])
+    found = Candidates.find(Shown(xy, cell, height[near], under, tops), HEADS)
+    return Scene(raw, settings, height, tops, found.marks, free_standing(found, under, REACH_M, DENSE, settings))
 
 
 def bed() -> Figure:

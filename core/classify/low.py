@@ -6,13 +6,19 @@ cells averages them. How much its mean differs from those beside it is therefore
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from scipy.ndimage import uniform_filter
 
-from .tops import WINDOW_M, Grid
+from .cells import Candidates, Shown, Standing, as_wanted, density_at, fitting, on_lines, on_rails, with_pairs
+from .labels import Near, label, whole_heads
+from .lines import reach_at
+from .pieces import pieces_of, with_partner
+from .ridges import Ridges
+from .settings import Settings
+from .tops import EMPTY, MILLIMETRES, WINDOW_M, Grid
 
 DOUBLINGS = 5
 """A line has 2 to this power of cells, 1.3 m: arcs of 25 m bend by 8 mm over it, and sleepers and stones alternate."""
@@ -59,6 +65,28 @@ class Low:
     rise: np.ndarray
     base: np.ndarray
     crest: np.ndarray
+
+
+def on_low(shown: Shown, settings: Settings) -> Standing:
+    """Find heads that stand just out of the ballast: lines above both sides, as wide as a head and with a partner."""
+    grid, tolerances = shown.tops.grid, settings.tolerances(thin=False)
+    low = find_low(grid, shown.mean_heights())
+    rise = np.where(np.isfinite(low.rise), np.round(low.rise * MILLIMETRES), EMPTY).astype(np.int16)
+    above = (shown.height - np.nan_to_num(low.base).ravel()[shown.cell]).astype(np.float32)
+    shown = replace(shown, height=above, tops=replace(shown.tops, top=rise))
+    found = Candidates.of(shown, np.flatnonzero(low.crest))
+    density = density_at(shown.bed.coarse, grid.middles(found.marks))
+    kept = with_pairs(on_lines(found, reach_at(density), tolerances, settings), settings, tolerances)
+    kept = on_rails(kept, np.ones(len(kept.cell), dtype=bool), settings, tolerances)
+    kept = kept.of(with_partner(kept.pairs, kept.paired))
+    if len(kept.cell):
+        piece = pieces_of(len(kept.cell), kept.pairs)
+        width_m = Ridges.measure(shown.xy, shown.height, kept.lines, piece).width_m
+        too_wide = width_m >= settings.head_width_m + tolerances.wider_m  # where one side is hidden, this is not known
+        kept = fitting(kept, piece, ~too_wide, settings, tolerances)
+    chosen = label(shown.tops, whole_heads(shown.tops, kept.cell, tolerances), shown.cell, shown.height, tolerances)
+    beside = Near.find(shown.xy[chosen], kept.lines)
+    return as_wanted(kept, np.ones(len(kept.cell), dtype=bool), chosen, beside, False, settings, tolerances)
 
 
 def find_low(grid: Grid, level: np.ndarray) -> Low:

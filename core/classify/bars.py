@@ -1,0 +1,164 @@
+"""Rails that stand out of their bed as bars that are as narrow as a head."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from .alone import are_solid, may_hide_partner
+from .cells import (
+    Candidates,
+    Kept,
+    Shown,
+    Standing,
+    are_certain,
+    are_free,
+    are_long,
+    are_paired,
+    as_wanted,
+    own_lengths,
+)
+from .labels import Near, label, whole_heads
+from .lines import Marks
+from .partner import MAJORITY, runs_inside
+from .pieces import LEAST_SINGLE_M, lengths, mean_of, pieces_of, with_partner
+from .ridges import Ridges
+from .settings import Settings, Tolerances
+
+SINGLE_HEIGHT_M = 0.12
+"""Least height above the bed of a rail without a partner: lower things are edges of slopes, kerbs and boards."""
+
+AS_HIGH_M = 0.03
+"""A rail without a partner may be lower if it stands as high as the rails of the square that have one, within this:
+ballast differs as much from track to track. Measured: 11 mm; kerbs and edges of slopes beside tracks 41 mm and more.
+Guard rails stand as high as the rail that they guard, or up to 20 mm higher."""
+
+GUARD_SHORTER_M = 2.0
+"""Least difference in length of a guard rail and the rail that it guards: it ends a metre before it on both sides. Two
+lone rails that are as long as each other are both rails, as where one of each of two tracks is hidden."""
+
+SINGLE_WIDTH = 0.2
+"""Least width of a rail without a partner by that of a head. A single profile of the scanner is a bar of no width where
+the ground falls beside it, as at the edge of a road: measured 2 to 4 mm. Heads measure 68 mm, and 19 mm where a train
+hides most of them."""
+
+SINGLE_SLOPE = 0.3
+"""Steepest bed of a rail without a partner: cant of 180 mm is 0.12, and a shoulder beside the rail makes it 0.22 at
+most; at the shoulder of a ballast bed it is 0.67. Where the far side of a slope is hidden, its crest looks like a bar
+on a bed of 0.38 and more."""
+
+SINGLE_DEPTH = 0.4
+"""Share of its height above the bed by which the ground on either side of a rail without a partner is lower. The plane
+of the bed bends at the crest of a bank, which then seems to be high. Measured: 0.31 to 0.35 there, and 0.55 and more
+on rails beside which the ground is seen."""
+
+SHARP_WIDER_M = 0.016
+"""Width beyond that of a head up to which a piece shows that the cloud is sharp. Measured over half of the rails of a
+cloud and more: up to 11 mm by scanners on vehicles, 13 mm by wide beams from the air, and from 20 mm on in images that
+blur by 3 cm, where a wider limit kept one rail and dropped the next."""
+
+
+def on_bars(
+    kept: Kept, thin: bool, found: Candidates, shown: Shown, settings: Settings, tolerances: Tolerances
+) -> Standing:
+    """Keep the cells of pieces that are as narrow as a head."""
+    heads = whole_heads(shown.tops, _completed(found, kept, settings, tolerances), tolerances)
+    chosen = label(shown.tops, heads, shown.cell, shown.height, tolerances)
+    beside = Near.find(shown.xy[chosen], kept.lines)
+    piece = pieces_of(len(kept.cell), kept.pairs)
+    width_m, share_m = beside.widths(piece), own_lengths(kept, settings)
+    narrow = (width_m < settings.head_width_m + tolerances.wider_m)[piece]
+    kinds = _by_shape(kept, piece, width_m, narrow, shown, settings)
+    sharp_m, round_m, unsure_m = (float(share_m[kind].sum()) for kind in kinds)
+    kept = _with_kept_partners(kept.of(narrow), settings, tolerances)
+    beside = Near.find(shown.xy[chosen], kept.lines)
+    rails = _are_rails(kept, beside, shown, settings, tolerances)
+    standing = as_wanted(kept, rails, chosen, beside, thin, settings, tolerances)
+    return replace(standing, sharp_m=sharp_m, round_m=round_m, unsure_m=unsure_m)
+
+
+def _completed(found: Candidates, kept: Kept, settings: Settings, tolerances: Tolerances) -> np.ndarray:
+    """Add to the kept cells the other candidates on their axes: the line that such a cell saw was a wrong one."""
+    others = np.setdiff1d(found.marks, kept.cell)
+    return np.union1d(kept.cell, others[_near_axes(found.at(others), kept, settings, tolerances.along_m)])
+
+
+def _near_axes(marks: Marks, kept: Kept, settings: Settings, height_m: float) -> np.ndarray:
+    """Return which marks lie on the axes of kept cells, and within `height_m` of them in height, (k,) bool."""
+    near = Near.find(marks.xy, kept.lines)
+    level = np.abs(kept.lines.height[near.cell] - marks.height[near.place]) < height_m
+    return near.on((settings.head_width_m + settings.cell_m) / 2, level)
+
+
+def _with_kept_partners(kept: Kept, settings: Settings, tolerances: Tolerances) -> Kept:
+    """Keep the pieces whose partners are kept as well, and of the others what may be a rail without a partner.
+
+    What was at gauge from a piece may have turned out to be too wide for a head, or too short for a rail.
+    """
+    partnered = with_partner(kept.pairs, are_paired(kept.lines, settings, tolerances))
+    kept = replace(kept, paired=kept.paired & partnered)
+    kept = kept.of(partnered | are_certain(kept.lines, kept.paired, kept.pairs))
+    return kept.of(are_long(kept, settings, settings.keep_single, tolerances.least_m))
+
+
+def _by_shape(
+    kept: Kept, piece: np.ndarray, width_m: np.ndarray, narrow: np.ndarray, shown: Shown, settings: Settings
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return which cells with a partner show a sharp cloud, which are round, and which are neither, (n,) bool each.
+
+    Those that are as narrow as a head in a sharp cloud, those that are wider and round, and those that are wider and
+    steep, but `narrow`, (n,), enough for a rail. Pieces have a width, (pieces,).
+    """
+    partnered = with_partner(kept.pairs, kept.paired)
+    sharp = partnered & (width_m < settings.head_width_m + SHARP_WIDER_M)[piece]
+    rounded = unsure = partnered & ~sharp
+    if rounded.any():
+        spread_m = Ridges.measure(shown.xy, shown.height, kept.lines, piece).spread_m
+        rounded = rounded & (spread_m > settings.head_width_m / 2)[piece]
+        unsure = unsure & narrow & (spread_m <= settings.head_width_m / 2)[piece]
+    return sharp, rounded, unsure
+
+
+def _are_rails(kept: Kept, beside: Near, shown: Shown, settings: Settings, tolerances: Tolerances) -> np.ndarray:
+    """Return which cells of narrow pieces belong to rails, (n,) bool: those with a partner, and some others.
+
+    Rails without a partner are as narrow as a head and no narrower, stand as high as a rail does that is not buried in
+    ballast, or as those that have a partner, their bed is not steeper than a track's, the ground beside is lower,
+    they are not guard rails, they overhang, and the other rail may be hidden. `beside` has the points in the height of
+    the heads, and the cells near them.
+    """
+    partnered = with_partner(kept.pairs, kept.paired)
+    if partnered.all():
+        return partnered
+    piece = pieces_of(len(kept.cell), kept.pairs)
+    width_m, height_m = beside.widths(piece), mean_of(kept.lines.height, piece)
+    narrow = width_m < settings.head_width_m + tolerances.wider_single_m
+    narrow &= width_m >= SINGLE_WIDTH * settings.head_width_m
+    high = height_m >= SINGLE_HEIGHT_M
+    rails = kept.lines.height[partnered & (lengths(kept.lines.axis, piece) >= LEAST_SINGLE_M)[piece]]
+    if len(rails):
+        high |= np.abs(height_m - np.median(rails)) < AS_HIGH_M
+    slope = np.hypot(*shown.bed.gradients(kept.lines.axis).T)
+    alone = narrow & high & (mean_of(slope, piece) <= SINGLE_SLOPE)
+    alone &= ~_are_guards(kept, piece, partnered, settings)
+    free = partnered.copy()
+    free[~partnered] = are_free(kept.of(~partnered), shown.tops, SINGLE_DEPTH * kept.lines.height[~partnered])
+    alone &= mean_of(free, piece) > MAJORITY
+    mine = alone[piece] & ~partnered
+    lines, (numbers, number) = kept.lines.of(mine), np.unique(piece[mine], return_inverse=True)
+    hidden = may_hide_partner(lines, number, shown.tops, settings, tolerances.partner_m)
+    alone[numbers] = hidden & ~are_solid(lines, number, shown.xy, shown.height, settings.head_width_m)
+    return partnered | alone[piece]
+
+
+def _are_guards(kept: Kept, piece: np.ndarray, partnered: np.ndarray, settings: Settings) -> np.ndarray:
+    """Return which pieces run along a longer one, or one with a partner, that is as high, within a gauge, (pieces,).
+
+    A guard rail ends before the rail that it guards, and hides it from a scanner beside the track.
+    """
+    length_m = np.where(partnered, np.inf, lengths(kept.lines.axis, piece)[piece])
+    inside = runs_inside(
+        kept.lines, length_m, kept.pairs, settings.gauges_m, settings.head_width_m, AS_HIGH_M, GUARD_SHORTER_M
+    )
+    return mean_of(inside, piece) > MAJORITY
