@@ -1,9 +1,9 @@
 """The way in which a cloud is searched: one for all of it, because it follows from the scanner and the railway.
 
-Rails are the only things of known width. A cloud that shows some of them as narrow as their heads is sharp, whatever
-else it shows, and one that shows round ones only is blunt. One that shows hardly any has tracks that are filled with
-ballast up to the heads, or no tracks. Of several sources, scanners and cameras, each is sharp or blunt
-(docs/classification.md).
+Rails are the only things of known width. A cloud that shows some of them as narrow as their heads is sharp, unless
+round ones are several times as long, and one that shows round ones only is blunt. One that shows hardly any has tracks
+that are filled with ballast up to the heads, or no tracks. Of several sources, scanners and cameras, each is sharp or
+blunt (docs/classification.md).
 """
 
 from __future__ import annotations
@@ -15,16 +15,17 @@ from ..rails import SearchFigures
 from .settings import Way
 
 SHARP_M = 20.0
-"""Length of rails as narrow as their heads that shows a cloud to be sharp. Measured: less than 2 m of a drone survey's
-770 m, a scanner's weeds and mixed pixels widen single metres."""
+"""Length of rails as narrow as their heads that shows a cloud to be sharp, unless it is certainly blunt. Measured: less
+than 2 m of a drone survey's 770 m, a scanner's weeds and mixed pixels widen single metres."""
 
 BLUNT_M = 100.0
 """Length of round rails that shows a cloud without these to be blunt; the rest of it need not be seen."""
 
 CLEAR = 5.0
 """How much longer narrow rails are than round ones in a source that is certainly sharp, and round ones than narrow ones
-in one that is certainly blunt. Passes of one wide beam from the air showed 33 m narrow and 35 m round, and 0 and 110 m;
-a scanner on a train 243 and 0 m, and images of the same rails 0 and 239 m."""
+in a cloud or source that is certainly blunt. Passes of one wide beam from the air showed 33 m narrow and 35 m round,
+and 0 and 110 m; a scanner on a train 243 and 0 m, and images of the same rails 0 and 239 m; sharp images of a track on
+slabs 33 and 266 m."""
 
 FIRST_PARTS = 4
 """Parts of a cloud that are searched first to find out; then as many again as were searched, until enough rails are
@@ -49,7 +50,7 @@ Answer = TypeVar("Answer", bound=HasFigures)
 
 def is_blunt(seen: SearchFigures) -> bool:
     """Return whether a cloud is blunt, by the sum of the figures of parts that were searched as if it were sharp."""
-    return seen.sharp_m < min(SHARP_M, _round_m(seen))
+    return seen.sharp_m < min(SHARP_M, _round_m(seen)) or _is_certainly_blunt(seen)
 
 
 def is_decided(seen: SearchFigures) -> bool:
@@ -72,7 +73,12 @@ def blunt_among(seen: Mapping[int, SearchFigures]) -> frozenset[int]:
     """
     if not any(figures.sharp_m >= max(SHARP_M, CLEAR * figures.round_m) for figures in seen.values()):
         return frozenset()
-    return frozenset(one for one, figures in seen.items() if _round_m(figures) >= max(BLUNT_M, CLEAR * figures.sharp_m))
+    return frozenset(one for one, figures in seen.items() if _is_certainly_blunt(figures))
+
+
+def _is_certainly_blunt(seen: SearchFigures) -> bool:
+    """Return whether round rails are many, and several times as long as narrow ones: a few of a blunt cloud are."""
+    return _round_m(seen) >= max(BLUNT_M, CLEAR * seen.sharp_m)
 
 
 def blunt_sources(
