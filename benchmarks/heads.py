@@ -108,7 +108,7 @@ def figures_of(scene: Scene, folder: Path) -> list[float]:
     network = drawn_once(scene, parameters, folder)
     start = time.process_time()
     cell_m = cell_size(standard.gauge_m, standard.head_width_m)
-    rails, _ = measure_lines(network, points, RAIL, parameters, cell_m)
+    rails, *_ = measure_lines(network, points, RAIL, parameters, cell_m)
     seconds = time.process_time() - start
     return [*errors_of(rails, scene.rails), seconds]
 

@@ -45,6 +45,9 @@ class RailPoints:
     `strips`, (n,), has the number of the strip, a pass of the scanner, that each point belongs to; None if all points
     are of one strip. If `found`, they are from a raw cloud, and not by their class: in a blunt one they are whole
     ridges. `blunt` says whether the cloud blunts heads, as its lines have shown; None before there are any.
+
+    Where the file states no strips and the heads have shown them, `apart`, (s, 4), has how far the strips 1 to s are
+    off the mean of all passes, x, y and z, and the number of passes in each.
     """
 
     xyz: np.ndarray
@@ -53,6 +56,7 @@ class RailPoints:
     strips: np.ndarray | None = None
     found: bool = False
     blunt: bool | None = None
+    apart: np.ndarray | None = None
 
     def kept(self, which: np.ndarray) -> RailPoints:
         """Return some of the points, by a mask (n,) bool or by their numbers (k,)."""

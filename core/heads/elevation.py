@@ -24,6 +24,7 @@ from .own_level import on_own_level
 from .smoother import BLUNT_HEIGHTS, KNOT_M, SHARP
 from .strips import StripOffsets, measure_strips
 from .top import MIN_POINTS, Top, by_lone_ridge, by_outline, find_top, fit_crown, smoothed
+from .unmarked import told_apart
 
 MIN_GAP_M, MAX_CHANCE_GAP_M = 0.5, 0.9
 """Length without points from which a line counts as bridged: five profiles of the fastest train's scanner. Where points
@@ -217,7 +218,9 @@ def measure_again(
     Returns rails in the order given; one without points keeps its heights and is a gap from end to end.
     """
     plans = [rail.line.resampled(KNOT_M).xy for rail in rails]
-    near = near_lines(plans, points.xyz, head_width_m, points.strips, progress.span(0.0, 0.7), points.blunt)
+    points = told_apart(points, plans, head_width_m)
+    seen = points.strips, progress.span(0.0, 0.7), points.blunt, points.apart
+    near = near_lines(plans, points.xyz, head_width_m, *seen)
     measured = []
     for rail, head in zip(rails, progress.span(0.7, 1.0).follow(near)):
         # Lines from a file are only known to be on their heads, so the head width takes the place of the cell size.

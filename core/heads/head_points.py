@@ -112,7 +112,7 @@ class HeadPoints:
     line : (k, 2) array
     free : (2, s) bool array
         Where the right and the left edge of the head are free of other heads; see `free_edges`.
-    strips : (n,) int array or None
+    strips, apart : arrays or None
         See `RailPoints`.
     is_blunt : bool
         Whether the cloud blunts heads: all or none, for one line alone, a centimetre off its head, may look otherwise.
@@ -126,6 +126,7 @@ class HeadPoints:
     free: np.ndarray
     strips: np.ndarray | None = None
     is_blunt: bool = False
+    apart: np.ndarray | None = None
 
     def __getitem__(self, which: np.ndarray) -> HeadPoints:
         strips = None if self.strips is None else self.strips[which]
@@ -246,6 +247,7 @@ def near_lines(
     strips: np.ndarray | None = None,
     progress: Progress = SILENT,
     blunt: bool | None = None,
+    apart: np.ndarray | None = None,
 ) -> list[HeadPoints]:
     """Find the points of each line, (k, 2); `widths`, metres, are those of all heads or of each.
 
@@ -257,7 +259,9 @@ def near_lines(
     for number, width_m in enumerate(np.broadcast_to(widths, len(lines)).tolist()):
         mine = slice(*np.searchsorted(feet.line, [number, number + 1]))
         strip = None if own is None else own[mine]
-        heads.append(HeadPoints(feet.t[mine], feet.across[mine], z[mine], width_m, lines[number], NO_EDGES, strip))
+        heads.append(
+            HeadPoints(feet.t[mine], feet.across[mine], z[mine], width_m, lines[number], NO_EDGES, strip, apart=apart)
+        )
     is_blunt = _are_blunt(heads) if blunt is None else blunt
     free = free_edges(lines, widest(widths), BESIDE_BLUNT_HEADS if is_blunt else BESIDE_HEADS)
     return [replace(head, is_blunt=is_blunt, free=own) for head, own in zip(heads, free)]

@@ -52,6 +52,9 @@ HOLE_M, END_M = 2.0, 2.0
 """Half the length without points that does not end a strip, and length of its ends that is left out: windows reach
 beyond the end there, where the line bends towards the next strip."""
 
+UNKNOWN = -1
+"""Number of the strip of points that show none."""
+
 ROUNDS = 3
 """Rounds of solving and weighing; a fourth changes offsets by less than 0.1 mm."""
 
@@ -79,6 +82,8 @@ class StripOffsets:
     gathered : (s, n) bool array
         Where the points of a strip belong on the mean of the strips that are there: where it has points, apart from
         short holes, if all of them together then show a sharper head.
+    passes : (s,) array
+        Number of passes that a strip holds, by which it counts: those of the same height cannot be told apart.
     """
 
     t: np.ndarray
@@ -88,6 +93,7 @@ class StripOffsets:
     points: np.ndarray
     shown: np.ndarray
     gathered: np.ndarray
+    passes: np.ndarray
 
     def moved(self, points: HeadPoints, align: bool = False) -> HeadPoints:
         """Move the points onto the mean of the strips that are at each place, or, to `align`, of all strips.
@@ -105,7 +111,8 @@ class StripOffsets:
         """Return how far strips, by their `offsets`, are off the mean that their points are moved onto, (s, n)."""
         if align:
             return offsets
-        mean = np.where(self.gathered, offsets, 0.0).sum(axis=0) / np.maximum(self.gathered.sum(axis=0), 1)
+        weight = self.gathered * self.passes[:, None]
+        mean = (weight * offsets).sum(axis=0) / np.maximum(weight.sum(axis=0), 1)
         return np.where(self.gathered, offsets - mean, 0.0)
 
     @property
@@ -128,11 +135,12 @@ class StripOffsets:
         The mean of strips errs as their differences show; a line that follows some of them more than others errs by its
         distance from the mean as well. Away from the place where strips meet, their errors there are the best estimate.
         """
-        count, meeting = self.count, self.count >= 2
+        meeting = self.count >= 2
         if not meeting.any():
             return np.zeros(len(self.t))
-        squares = np.sum(np.where(self.shown, offsets, 0.0) ** 2, axis=0)
-        of_mean = np.sqrt(squares[meeting] / (count * (count - 1))[meeting])
+        weight = self.shown * self.passes[:, None]
+        squares, passes = np.sum(weight * offsets**2, axis=0), weight.sum(axis=0)
+        of_mean = np.sqrt(squares[meeting] / (passes * (passes - 1))[meeting])
         share = self.points / np.maximum(self.points.sum(axis=0), 1e-9)
         followed = np.zeros(len(self.t))
         for number, (own, off) in enumerate(zip(offsets, self._off(offsets, align))):
@@ -159,9 +167,11 @@ def measure_strips(points: HeadPoints) -> StripOffsets | None:
     """Measure the offsets of the strips along a line within 3 cm of its rail; None where a single strip shows it."""
     if points.strips is None:
         return None
+    if points.apart is not None:
+        return _known(points, points.strips, points.apart)
     seen = []
-    for strip in np.unique(points.strips):
-        shown = _Shown.by(points[points.strips == strip])
+    for strip in np.unique(points.strips[points.strips != UNKNOWN]):
+        shown = Shown.by(points[points.strips == strip])
         if shown is not None:
             seen.append((int(strip), shown))
     if len(seen) < 2:
@@ -180,9 +190,30 @@ def measure_strips(points: HeadPoints) -> StripOffsets | None:
         uniform_filter1d(counts.astype(float), reach, axis=1, mode="constant"),
         shown,
         _without_holes(counts > 0),
+        np.ones(len(seen)),
     )
     sharper = not points.is_blunt and head_noise(found.moved(points)) < head_noise(points)
     return found if sharper else replace(found, gathered=np.zeros_like(found.gathered))
+
+
+def _known(points: HeadPoints, strips: np.ndarray, apart: np.ndarray) -> StripOffsets | None:
+    """Return the offsets along a line of strips that are apart alike in the whole cloud; see `RailPoints`."""
+    numbers, steps = np.arange(1, len(apart) + 1), _steps(points.length_m)
+    t, line = (np.arange(steps) + 0.5) * STEP_M, Polyline(points.line)
+    normals = interpolate(line.normals, line.t, t)
+    step = np.minimum((points.t / STEP_M).astype(int), steps - 1)
+    counts = np.array([np.bincount(step[strips == number], minlength=steps) for number in numbers])
+    reach = 2 * int(round(MEETING_M / STEP_M)) + 1
+    return StripOffsets(
+        t,
+        numbers,
+        apart[:, :2] @ normals.T,
+        np.tile(apart[:, 2:3], steps),
+        uniform_filter1d(counts.astype(float), reach, axis=1, mode="constant"),
+        maximum_filter1d((counts > 0).astype(np.uint8), reach, axis=1, mode="constant") > 0,
+        np.ones(counts.shape, dtype=bool),
+        apart[:, 3],
+    )
 
 
 def _without_holes(there: np.ndarray) -> np.ndarray:
@@ -197,7 +228,7 @@ def _steps(length_m: float) -> int:
 
 
 @dataclass(frozen=True)
-class _Shown:
+class Shown:
     """How one strip shows a line, at n stations `STEP_M` apart.
 
     `across` and `up`, (n,), are the offset of the middle of the head to the left of the line and the height of its top;
@@ -209,7 +240,7 @@ class _Shown:
     points: np.ndarray
 
     @classmethod
-    def by(cls, strip: HeadPoints) -> _Shown | None:
+    def by(cls, strip: HeadPoints) -> Shown | None:
         """Measure the head in the points of one strip; None if it has too few."""
         top, _ = strip.top
         stations, (middle, _) = strip.stations, edge_middles(strip, strip.free)

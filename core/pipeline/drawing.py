@@ -67,6 +67,9 @@ def drawn(
         judged.append(source)
         any_square |= bool(parts) or not squares
         strips += [rows_in_frame(part, source.frame) for part in parts]
+        told = 0 if source.is_marked else len({strip for part in parts for strip in part.strips[:, 2].tolist()})
+        if told:
+            share.info(f"Class {code}: the points state no scanner passes; the heads show them on {told} levels.")
         found: list[RailLine] = []
         if parts:
             is_searched = points.search is not None and not any(part.blunt for part in parts)

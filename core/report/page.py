@@ -60,7 +60,8 @@ NOTES = (
 STRIP_NOTE = (
     "Offsets of each strip, a pass of the scanner, from the mean of the strips that show the same place, as they are "
     "before any alignment: to the left, seen along the track, and upwards. Only places are listed where several strips "
-    "show a rail or one passes on to the next."
+    "show a rail or one passes on to the next. Where the points state neither source ids nor GPS times, strips are the "
+    "levels on which all heads are, from the lowest on; lines are on the mean of the passes."
 )
 
 STATED_APART = ("gauge_m", "head_width_m", "other_gauges_m", "other_heads_m", "engine", "device", "keep_cleaned")

@@ -21,6 +21,7 @@ from ..heads.head_points import about_crest, judged, lengths_by_kind, near_lines
 from ..heads.refinement import refine
 from ..heads.roads import onto_heads
 from ..heads.strips import measure_strips, rows_of
+from ..heads.unmarked import told_apart
 from ..lines.ends import FIT_M
 from ..lines.finishing import finished
 from ..lines.network import LineNetwork
@@ -182,8 +183,7 @@ def _all_vertices(
     network = draw_lines(raster, parameters, drawing)
     if points is not None:
         points = judged(points, network.lines, parameters.head_width_m)
-    rails, strips = measure_lines(network, points, class_code, parameters, raster.cell_m, measuring)
-    return rails, strips, None if points is None else points.blunt
+    return measure_lines(network, points, class_code, parameters, raster.cell_m, measuring)
 
 
 def draw_lines(raster: RailRaster, parameters: Parameters, progress: Progress = SILENT) -> LineNetwork:
@@ -206,7 +206,7 @@ def measure_lines(
     parameters: Parameters,
     cell_m: float,
     progress: Progress = SILENT,
-) -> tuple[tuple[RailLine, ...], np.ndarray]:
+) -> tuple[tuple[RailLine, ...], np.ndarray, bool | None]:
     """Move the lines of `draw_lines` onto their heads and measure them; see `_all_vertices`."""
     refining, elevating = progress.split(2)
     elevation = ElevationParameters(
@@ -219,16 +219,22 @@ def measure_lines(
         align=parameters.strips == ALIGNED,
     )
     if points is None:
-        return flat_rails(network, class_code, elevation), rows_of((), ())
+        return flat_rails(network, class_code, elevation), rows_of((), ()), None
     drawn = [flat_rail(line, class_code) for line in network.lines]
     heads = widths_by_gauge(drawn, parameters.gauges, parameters.centerline_tolerance_m)
     spacings_m = [sum(gauge) for gauge in parameters.gauges]
     network = replace(network, lines=onto_heads(network.lines, points, heads, spacings_m))
-    network = refine(network, points, heads, parameters.smoothing_xy_m, refining, elevation.align, cell_m)
-    near = near_lines(network.lines, points.xyz, heads, points.strips, elevating.span(0.0, 0.6), points.blunt)
+    settings = parameters.smoothing_xy_m, refining, elevation.align, cell_m
+    network = refine(network, points, heads, *settings)
+    told = told_apart(points, network.lines, heads)
+    if told is not points:
+        points, network = told, refine(network, told, heads, *settings)
+    near = near_lines(
+        network.lines, points.xyz, heads, points.strips, elevating.span(0.0, 0.6), points.blunt, points.apart
+    )
     strips = [measure_strips(head) for head in near]
     rails = elevate(network, near, class_code, elevation, elevating.span(0.6, 1.0), strips)
-    return rails, rows_of(network.lines, strips)
+    return rails, rows_of(network.lines, strips), points.blunt
 
 
 def _numbered(rails: Sequence[RailLine], parameters: Parameters, first_id: int, progress: Progress) -> list[RailLine]:

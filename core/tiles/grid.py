@@ -98,6 +98,10 @@ class PointSource(Protocol):
     def span_m(self) -> float:
         """Longer side of the bounding rectangle of all points."""
 
+    @property
+    def is_marked(self) -> bool:
+        """Whether the points state several strips."""
+
     def near(self, square: Square, margin_m: float) -> RailPoints:
         """Read the points of a square and those at most `margin_m` outside, in the frame of the square."""
 
@@ -140,7 +144,7 @@ class Filling:
     def __post_init__(self) -> None:
         source = self.source
         self.frame, self.class_code, self.side_m = source.frame, source.class_code, source.side_m
-        self.counts, self.span_m = source.counts, source.span_m
+        self.counts, self.span_m, self.is_marked = source.counts, source.span_m, source.is_marked
 
     def near(self, square: Square, margin_m: float) -> RailPoints:
         """See `PointSource`."""
@@ -197,6 +201,7 @@ class MemorySource:
         self._given = points
         self._of_strips: dict[tuple[frozenset[int], bool], MemorySource] = {}
         points = heads_of(points)
+        self.is_marked = points.strips is not None
         self.frame, self.class_code, self.side_m = points.frame, points.class_code, side_m
         origin = Square.on_grid((0, 0), side_m, points.frame).frame.shift_to(points.frame)
         self._points, self._members = points, Tiling(side_m).sort(points.xyz - origin)

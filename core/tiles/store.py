@@ -132,6 +132,11 @@ class SpooledPoints:
     blunt: bool | None = None
     fills = False
 
+    @property
+    def is_marked(self) -> bool:
+        """See `PointSource`."""
+        return len(set(self.passes.values())) > 1
+
     def near(self, square: Square, margin_m: float) -> RailPoints:
         """See `PointSource`."""
         keys = sorted(self.files) if square.is_whole_plane else around(square.key)

@@ -20,6 +20,8 @@ from rail_extract.core.standards import STANDARDS, RailStandard
 from rail_extract.core.tiles.grid import SortedPoints
 from rail_extract.core.tracks.centerlines import tracks_of
 from rail_extract.laboratory.curves import Element, trace, transition_curve
+from rail_extract.laboratory.ruler.lines import match
+from rail_extract.laboratory.scenes import strips
 from rail_extract.laboratory.scenes.plain import straight
 from rail_extract.laboratory.scenes.scanner import Scanner
 from rail_extract.laboratory.scenes.scene import Plan, build
@@ -339,3 +341,18 @@ def test_images_show_the_rails_where_the_scanner_does_not():
     assert all(np.count_nonzero((along > start) & (along < start + 5)) > 200 for start in range(0, 60, 5))
     said = [warning for warning in both.warnings if "Where only blunt ones show a rail, on " in warning]
     assert float(said[0].split("a rail, on ")[1].split(" m")[0]) == pytest.approx(70, abs=2)
+
+
+def test_passes_that_the_points_do_not_state_are_told_apart_by_levels():
+    """Lines are on the mean of the passes; the log says it once, and the report has their offsets."""
+    scene = strips.unmarked_heights()
+    points = cloud_of(scene.xyz[scene.classification == scene.classification.max()])
+    settings = Parameters(scene.standard.gauge_m, scene.standard.head_width_m, engine="OPENCV")
+    heard = Heard()
+    network = extract_rails([points], settings, heard)
+    told = [text for text in heard.infos if "state no scanner passes" in text]
+    assert told == ["Class 10: the points state no scanner passes; the heads show them on 2 levels."]
+    assert [round(float(np.mean(course.up_mm))) for course in network.strips] == [-6, 6]
+    found = match([network.frame.to_crs(rail.xyz) for rail in network.rails], scene.rails)
+    assert len(network.rails) == 2 and abs(np.mean(found.back.height) - 0.006) < 0.001
+    assert min(rail.sigmaz_mm for rail in network.rails) > 5
