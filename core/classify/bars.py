@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from .alone import are_solid, may_hide_partner
+from .alone import are_solid, may_hide_partner, slopes_beside
 from .cells import (
     Candidates,
     Kept,
@@ -47,6 +47,11 @@ SINGLE_SLOPE = 0.3
 """Steepest bed of a rail without a partner: cant of 180 mm is 0.12, and a shoulder beside the rail makes it 0.22 at
 most; at the shoulder of a ballast bed it is 0.67. Where the far side of a slope is hidden, its crest looks like a bar
 on a bed of 0.38 and more."""
+
+SINGLE_FALL = 0.6
+"""Steepest fall of the ground beside a rail without a partner, on the flatter side that is seen. Planes of the bed do
+not follow slopes of 0.7 and more: cells of 0.5 m then differ by more than neighbours may. Measured: 0.93 to 1.0 at the
+crest of a cutting, 0.15 at most beside rails."""
 
 SINGLE_DEPTH = 0.4
 """Share of its height above the bed by which the ground on either side of a rail without a partner is lower. The plane
@@ -141,6 +146,7 @@ def _are_rails(kept: Kept, beside: Near, shown: Shown, settings: Settings, toler
         high |= np.abs(height_m - np.median(rails)) < AS_HIGH_M
     slope = np.hypot(*shown.bed.gradients(kept.lines.axis).T)
     alone = narrow & high & (mean_of(slope, piece) <= SINGLE_SLOPE)
+    alone &= slopes_beside(kept.lines, piece, kept.cell, shown.tops) <= SINGLE_FALL
     alone &= ~_are_guards(kept, piece, partnered, settings)
     free = partnered.copy()
     free[~partnered] = are_free(kept.of(~partnered), shown.tops, SINGLE_DEPTH * kept.lines.height[~partnered])

@@ -189,7 +189,7 @@ def are_free(kept: Kept, tops: Tops, depth_m: np.ndarray, slope: np.ndarray | fl
 
 def are_paired(lines: Lines, settings: Settings, tolerances: Tolerances) -> np.ndarray:
     """Return which cells have a partner, (n,) bool."""
-    return have_partners(lines, settings.spacings_m, tolerances.partner_m)
+    return have_partners(lines, settings.spacings_m, tolerances.partner_m, tolerances.worse_m)
 
 
 def are_long(kept: Kept, settings: Settings, keep_single: bool, least_m: float) -> np.ndarray:

@@ -1,7 +1,7 @@
 """The other rail of the track, and what else runs inside a track.
 
 A rail has a parallel line at the distance of the two heads. Guard, check and third rails have none; they run beside a
-rail that has.
+rail that has. So do kerbs and shoulders that are at this distance from the near rail of a track.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ TOO_WIDE_M = 0.03
 closed from 28 to 35 mm of widening on. Measured: rails 26 mm less to 2 mm more, the kerbs of a street 36 to 43 mm."""
 
 INSIDE_M = 0.02
-"""What runs inside a track is this far beyond a head's width from a rail at least, and too close to it for its partner:
-a guard rail beside that one is, on the other side of a flangeway of 38 to 60 mm."""
+"""What runs along a rail, and is none, is this far beyond a head's width from it at least: a guard rail is on the other
+side of a flangeway of 38 to 60 mm."""
 
 PARALLEL_RAD = 0.07
 """Angle to the rail within which a line runs along it; the branch of a turnout leaves at 1:9 to 1:14."""
@@ -51,12 +51,12 @@ MAJORITY = 0.5
 """Share of the cells of a line, or of a piece of rail, that decides for all."""
 
 
-def have_partners(lines: Lines, spacings_m: Sequence[float], height_m: float) -> np.ndarray:
+def have_partners(lines: Lines, spacings_m: Sequence[float], height_m: float, worse_m: float = np.inf) -> np.ndarray:
     """Return which cells belong to a pair of rails, (n,) bool, at the best of the distances of the two heads.
 
-    `height_m` is the largest difference in height above the bed.
+    `height_m` is the largest difference in height above the bed; see `partners` for `worse_m`.
     """
-    stations = [partners(lines, spacing_m, SPACING_M, height_m)[0] for spacing_m in spacings_m]
+    stations = [partners(lines, spacing_m, SPACING_M, height_m, worse_m)[0] for spacing_m in spacings_m]
     return np.max(stations, axis=0) >= MIN_STATIONS
 
 
@@ -78,33 +78,53 @@ def are_within_gauge(lines: Lines, piece: np.ndarray, spacings_m: Sequence[float
 
 
 def partners(
-    lines: Lines, spacing_m: float, tolerance_m: float, height_m: float
+    lines: Lines, spacing_m: float, tolerance_m: float, height_m: float, worse_m: float = np.inf
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Find the partners of each cell's line on the better side: `spacing_m` away, give or take `tolerance_m`.
 
-    They differ by at most `height_m` in height above the bed. Returns, (n,) each, the number of stations with a
-    partner, 0 to 5, the side, 1 if the partner is to the left and -1 to the right, and its mean distance, NaN without
-    one.
+    They differ by at most `height_m` in height above the bed. A rail has one partner: what is at gauge from one that
+    has a partner on its other side, nearer to `spacing_m` by `worse_m`, has none. Returns, (n,) each, the
+    number of stations with a partner, 0 to 5, the side, 1 if the partner is to the left and -1 to the right, and its
+    mean distance, NaN without one.
     """
     count = len(lines.axis)
     if count < 2:
         return np.zeros(count, dtype=np.int64), np.ones(count, dtype=np.int64), np.full(count, np.nan)
     tree = cKDTree(lines.axis)
-    left, right = (
-        np.array([_partnered(lines, tree, side * spacing_m, share, tolerance_m, height_m) for share in STATIONS])
+    found = [
+        [_partnered(lines, tree, side * spacing_m, share, tolerance_m, height_m) for share in STATIONS]
         for side in (1, -1)
-    )
-    better = np.isfinite(left).sum(axis=0) >= np.isfinite(right).sum(axis=0)
-    apart = np.abs(np.where(better, left, right))
-    stations = np.isfinite(apart).sum(axis=0)
-    mean = np.where(stations > 0, np.nansum(apart, axis=0) / np.maximum(stations, 1), np.nan)
-    return stations, np.where(better, 1, -1), mean
+    ]
+    other, apart_m = (np.array([[one[number] for one in side] for side in found]) for number in (0, 1))
+    if np.isfinite(worse_m):
+        apart_m[_belongs_to_another(lines, other, apart_m, spacing_m, worse_m)] = np.nan
+    stations, mean_m = _summed_up(apart_m)
+    left = stations[0] >= stations[1]
+    return np.where(left, *stations), np.where(left, 1, -1), np.where(left, *mean_m)
+
+
+def _summed_up(apart_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Count the stations with a partner on each side, (2, stations, n), and their mean distance: (2, n) each."""
+    stations, apart_m = np.isfinite(apart_m).sum(axis=1), np.abs(apart_m)
+    return stations, np.where(stations > 0, np.nansum(apart_m, axis=1) / np.maximum(stations, 1), np.nan)
+
+
+def _belongs_to_another(
+    lines: Lines, other: np.ndarray, apart_m: np.ndarray, spacing_m: float, worse_m: float
+) -> np.ndarray:
+    """Return where a partner, a cell at a distance, (2, stations, n), has a better one on its other side, bool."""
+    stations, mean_m = _summed_up(apart_m)
+    off_m = np.where(stations >= MIN_STATIONS, np.abs(mean_m - spacing_m), np.inf)
+    same = np.einsum("skij,ij->ski", lines.across[other], lines.across) > 0  # lines have no direction
+    to_left = np.array([True, False])[:, None, None]
+    beyond_m = off_m[np.where(same == to_left, 0, 1), other]
+    return beyond_m + worse_m < off_m[:, None]
 
 
 def _partnered(
     lines: Lines, tree: cKDTree, left_m: float, share: float, tolerance_m: float, height_m: float
-) -> np.ndarray:
-    """Distance to the left of each line's partner at one station, (n,); NaN without one."""
+) -> tuple[np.ndarray, np.ndarray]:
+    """Cell of each line's partner at one station, (n,), and its distance to the left, (n,); NaN without one."""
     places = lines.axis + share * lines.reach_m * lines.along + left_m * lines.across
     _, near = tree.query(places, k=np.arange(1, min(CANDIDATES, tree.n) + 1), distance_upper_bound=SEARCH_M)
     own, rank = np.nonzero(near < tree.n)
@@ -113,10 +133,10 @@ def _partnered(
     fits = np.abs(apart - left_m) < tolerance_m
     fits &= np.abs(lines.height[other] - lines.height[own]) < height_m
     fits &= _angle(lines.theta[other], lines.theta[own]) < ANGLE_RAD
-    found = np.full(len(lines.axis), np.nan)
+    cell, found = np.zeros(len(lines.axis), dtype=np.int64), np.full(len(lines.axis), np.nan)
     # Written from the farthest to the nearest, the nearest one stays.
-    found[own[fits][::-1]] = apart[fits][::-1]
-    return found
+    cell[own[fits][::-1]], found[own[fits][::-1]] = other[fits][::-1], apart[fits][::-1]
+    return cell, found
 
 
 def runs_inside(
@@ -128,7 +148,7 @@ def runs_inside(
     height_m: float = np.inf,
     more: float = 0.0,
 ) -> np.ndarray:
-    """Return which cells belong to something that runs along what is rather a rail, at less than the gauge, (n,) bool.
+    """Return which cells belong to something that runs along what is rather a rail, at gauge or nearer, (n,) bool.
 
     That has a `rank`, (n,), higher by `more`, and differs by less than `height_m` in height above the bed; `links`,
     (m, 2), are pairs of cells on one line.
@@ -139,7 +159,8 @@ def runs_inside(
     single, rails = np.flatnonzero(rank < rank.max()), np.flatnonzero(rank > rank.min())
     if not len(single) or not len(rails):
         return inside
-    reach_m = np.hypot(max(gauges_m), LEVEL_WITH_M)
+    too_far_m = max(gauges_m) + head_width_m + SPACING_M
+    reach_m = np.hypot(too_far_m, LEVEL_WITH_M)
     near = cKDTree(lines.axis[single]).sparse_distance_matrix(
         cKDTree(lines.axis[rails]), reach_m, output_type="ndarray"
     )
@@ -147,8 +168,7 @@ def runs_inside(
     step = lines.axis[own] - lines.axis[rail]
     left = np.abs(np.einsum("ij,ij->i", step, lines.across[rail]))
     ahead = np.abs(np.einsum("ij,ij->i", step, lines.along[rail]))
-    too_close_m = max(gauges_m) + head_width_m - SPACING_M
-    beside = (left > head_width_m + INSIDE_M) & (left < too_close_m) & (ahead < LEVEL_WITH_M)
+    beside = (left > head_width_m + INSIDE_M) & (left < too_far_m) & (ahead < LEVEL_WITH_M)
     beside &= _angle(lines.theta[own], lines.theta[rail]) < PARALLEL_RAD
     beside &= (rank[own] + more < rank[rail]) & (np.abs(lines.height[own] - lines.height[rail]) < height_m)
     inside[own[beside]] = True

@@ -36,6 +36,10 @@ class Tolerances:
     partner_m : float
         Difference in height above the bed between the two rails of a track: beside a shoulder or a platform, their
         beds differ by up to 6 cm.
+    worse_m : float
+        How much worse the distance of something fits two heads than that of the rails of a track beside it: a kerb or
+        the shoulder of the ballast may be at gauge from the near one. Axes of cells are known as well. Measured: 7 to
+        20 mm beside sharp heads, 35 mm beside low ones.
     below_m, above_m : float
         Heights of rail points relative to the mean top: half a head downwards, and noise with the waves of the bed
         upwards.
@@ -58,6 +62,7 @@ class Tolerances:
     spread_m: float
     beside_line_m: float
     partner_m: float
+    worse_m: float
     below_m: float
     above_m: float
     below_share: float
@@ -78,6 +83,7 @@ DENSE = Tolerances(
     spread_m=0.045,
     beside_line_m=0.050,
     partner_m=0.08,
+    worse_m=0.005,
     below_m=0.040,
     above_m=0.025,
     below_share=0.5,
@@ -94,6 +100,7 @@ THIN = Tolerances(
     spread_m=0.060,
     beside_line_m=0.065,
     partner_m=0.07,
+    worse_m=0.015,
     below_m=0.045,
     above_m=0.065,
     below_share=0.5,
@@ -105,7 +112,9 @@ THIN = Tolerances(
 )
 """For scanners in the air: a beam of 4 to 9 cm blends the head and the ballast."""
 
-BLUNT = replace(DENSE, band=BURIED, least_m=5.0, partner_m=0.05, below_m=0.12, below_share=3.0, above_m=0.06)
+BLUNT = replace(
+    DENSE, band=BURIED, least_m=5.0, partner_m=0.05, worse_m=0.03, below_m=0.12, below_share=3.0, above_m=0.06
+)
 """For clouds that blur a head to a round ridge. Any mound of its width is as round, and up to 4 m of one are opposite
 something else by chance. Beside its crest, the ridge falls by up to 5 cm; noise and a bed that slopes add as much. A
 limit that cut the lower side off would move the line, and one near the mean of the tops would lower it."""

@@ -59,8 +59,10 @@ def test_the_edge_of_a_trough_of_whose_top_little_is_seen_is_no_rail():
     assert not found[trough[seen]].any()
 
 
-@pytest.mark.parametrize("left", [SPACING / 2 - WIDTH - 0.045, SPACING / 2 + 0.4])
-def test_guard_and_third_rails_go_and_rails_stay(left):
+@pytest.mark.parametrize(
+    "left", [SPACING / 2 - WIDTH - 0.045, SPACING / 2 + 0.4, 1.5 * SPACING + 0.018, -1.5 * SPACING + 0.035]
+)
+def test_guard_and_third_rails_and_what_is_at_gauge_from_a_track_go_and_rails_stay(left):
     rng = np.random.RandomState(5)
     xyz, on = ballasted(rng)
     xyz, bar = with_bar(xyz, WIDTH, 0.3, left, 0.18)
@@ -89,6 +91,16 @@ def test_the_crest_of_a_slope_whose_far_side_is_hidden_is_not_a_lone_rail(slope,
     xyz[:, 2] += slope * across
     found = classify_square(xyz[across < 0.05], SETTINGS)
     assert found.rail.any() == kept
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.03, 0.2])
+def test_the_crest_of_a_steep_slope_is_not_a_lone_rail_in_any_direction(angle):
+    """Along the cells of the bed, each of them seems to be a level of its own."""
+    rng = np.random.RandomState(5)
+    xyz = flat(16.0, rng=rng, per_m2=600)
+    left = turned(xyz, angle)[1]
+    xyz[:, 2] = 0.94 * left + rng.normal(0, 0.003, len(xyz))
+    assert not classify_square(xyz[(left < 0) & (left > -3)], SETTINGS).rail.any()
 
 
 def test_the_crest_of_a_bank_that_is_hardly_higher_than_its_ground_is_not_a_lone_rail():
