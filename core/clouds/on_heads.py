@@ -64,10 +64,15 @@ five points, one may be a stray."""
 WIDEST_M = 0.08
 """Distance of the faces of the widest head, 78 mm; those of two heads, as in switches, are further apart."""
 
-FOUND_HEAD_M, FOUND_SIGMAS = 0.036, 5.0
-"""Depth below the crown of what was found in a raw cloud, and standard deviations of the noise if they are more, as in
-clouds from the air. The search takes all of the web down to 50 mm below the top where a rail is seen from the side; few
-points of a rail at such angles show its faces. The lowest part of a face may go."""
+FACES_M, FACES_SIGMAS = 0.036, 7.0
+"""Depth below the crown of the points on heads where others lie below, and standard deviations of the noise if they are
+more, as in clouds from the air: what is left of a web is in the middle of the head, and a scanner that sees few points
+of the crown shows more there. The lowest part of a face may go. The noise is known from points above the crown alone,
+whose height is above the mean of the top, so that it is taken for half."""
+
+BELOW_SHARE = 0.1
+"""Least share of the points of a class that are below heads where it holds whole rails. The search of a raw cloud
+always takes the web down to 50 mm below the top where a rail is seen from the side."""
 
 RECESS_M = (0.015, 0.05)
 """Distances of a web from the face above it: 20 mm or more on every standard, and the undersides of heads are between;
@@ -171,7 +176,10 @@ def on_heads(xyz: np.ndarray, found: bool = False) -> np.ndarray:
         step *= (slope * along)[place]
         depth_m += step
     noise_m = _noise(depth_m)
-    head_m = max(FOUND_HEAD_M, FOUND_SIGMAS * noise_m) if found else HEAD_M + NOISE_SIGMAS * noise_m
+    below = depth_m > HEAD_M + NOISE_SIGMAS * noise_m
+    if found or np.mean(below & (depth_m <= RAIL_M)) > BELOW_SHARE:
+        higher_m = np.abs(slope).astype(np.float32) * HALF_LENGTH_M[0] / 2  # the crown is that of the upper points
+        below |= depth_m - higher_m[place] > max(FACES_M + noise_m, FACES_SIGMAS * noise_m)
     off_m = np.full(len(xyz), np.inf, dtype=np.float32)
     for edge in faces.astype(np.float32).T:
         np.fmin(off_m, np.abs(across_m - edge[place]), out=off_m)
@@ -179,7 +187,7 @@ def on_heads(xyz: np.ndarray, found: bool = False) -> np.ndarray:
     scatter_m = sigma_by_median(off_m[on_faces]) if on_faces.any() else np.inf
     recessed = (off_m > RECESS_M[0] + SCATTER_SIGMAS * scatter_m) & (off_m < RECESS_M[1])
     recessed &= depth_m > FACE_M[1] + noise_m
-    return ~((recessed | (depth_m > head_m)) & (depth_m <= RAIL_M))
+    return ~((recessed | below) & (depth_m <= RAIL_M))
 
 
 def _thinned(place: np.ndarray) -> np.ndarray:
