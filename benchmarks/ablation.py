@@ -82,6 +82,11 @@ def all_of(values: Any, *_: Any) -> np.ndarray:
     return np.ones(len(getattr(values, "axis", values)), dtype=bool)
 
 
+def all_paired(lines: Any, paired: np.ndarray, pairs: Any) -> np.ndarray:
+    """Choose all cells, with a partner or without."""
+    return all_of(paired)
+
+
 def _rule(name: str, value: Any, *also: tuple[str, str, Any]) -> Switch:
     module, attribute = name.rsplit(".", 1)
     return Switch(name, ((module, attribute, value), *also))
@@ -120,20 +125,25 @@ SWITCHES = (
     _rule("tracks.parallels._is_crowded", none_of),
     _rule("checks.warnings._off_level_m", lambda *_: 0.0),
     _rule("checks.doubts.find_jumps", nothing),
-    _rule("classify.square.stands_free", lambda tops, band, marks, lines, slope: all_of(lines)),
-    _rule("classify.square.runs_inside", none_of),
-    _rule("classify.square.lower_than_beside", none_of),
-    _rule("classify.square.centred", first),
-    _rule("classify.square._completed", lambda found, kept, *_: np.sort(kept.cell)),
-    _rule("classify.square._certain", lambda lines, paired, pairs: all_of(paired)),
+    _rule("classify.cells.stands_free", lambda tops, depth_m, marks, lines, *_: all_of(lines)),
+    _rule("classify.cells.runs_inside", none_of, ("classify.bars", "runs_inside", none_of)),
+    _rule("classify.cells.lower_than_beside", none_of),
+    _rule("classify.cells.centred", first),
+    _rule("classify.bars._completed", lambda found, kept, *_: np.sort(kept.cell)),
+    _rule("classify.cells.are_certain", all_paired, ("classify.bars", "are_certain", all_paired)),
     _rule("classify.labels._highest_around", lambda image, cells, reach: np.full(len(cells), -(10**6))),
     _rule("classify.labels.UNDER_MEAN_M", 10.0),
     _rule("classify.square.flush_rails", lambda *_: Flush(np.empty(0, dtype=np.int64), NO_LINES, NO_LINES)),
-    _rule("classify.square.SINGLE_SLOPE", np.inf),
-    _rule("classify.square.SINGLE_HEIGHT_M", 0.0),
+    _rule("classify.bars.SINGLE_SLOPE", np.inf),
+    _rule("classify.bars.SINGLE_FALL", np.inf),
+    _rule("classify.bars.SINGLE_DEPTH", -np.inf),
+    _rule("classify.bars.SINGLE_HEIGHT_M", 0.0),
+    _rule("classify.partner._belongs_to_another", lambda lines, other, apart_m, *_: np.zeros(apart_m.shape, bool)),
     _rule("classify.partner._majority", first),
     _rule("classify.labels.MIN_AXES", 1),
     _rule("classify.tops._around", first),
+    _rule("clouds.on_heads.BELOW_SHARE", 1.0),
+    _rule("squares.steps.told_apart", first),
     _rule("heads.refinement._points_of_arc", lambda *_: np.zeros(2)),
     _rule("heads.refinement.HEEL_SPREAD_M", np.inf),
     _rule("heads.head_points.CROSSED_M", np.inf),

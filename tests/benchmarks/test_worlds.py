@@ -51,14 +51,3 @@ def test_a_line_of_a_world_says_what_was_drawn_and_what_came_out(program):
     assert again["found %"] == 100
     assert again["expected"] == [2, 2]
     assert again["within"]["n m"] == pytest.approx(again["to find m"], rel=0.1)
-
-
-def test_a_rule_is_judged_by_the_worlds_that_fail_without_it_alone(monkeypatch):
-    pytest.importorskip("skimage", reason="the plain script of the golden table needs it")
-    monkeypatch.syspath_prepend(str(PROGRAM.parent))
-    rows_of_worlds = runpy.run_path(str(PROGRAM.with_name("ablation.py")))["rows_of_worlds"]
-    outcomes = [(False, {"needed": True, "idle": False})] * 8 + [(True, {"needed": True})] * 2 + [(False, {})] * 10
-    rows = list(rows_of_worlds(["needed", "idle"], outcomes))
-    assert rows[0] == "20 worlds, 2 fail with all rules."
-    assert rows[2] == "| `needed` | 10 | 8 | 0 | 0.008 |"
-    assert rows[3] == "| `idle` | 8 | 0 | 0 | 1.000 |"
