@@ -70,10 +70,12 @@ more, as in clouds from the air: what is left of a web is in the middle of the h
 of the crown shows more there. The lowest part of a face may go. The noise is known from points above the crown alone,
 whose height is above the mean of the top, so that it is taken for half."""
 
-BELOW_SHARE = 0.05
-"""Least share of the points of a class that are below heads where it holds whole rails: measured, up to 0.04 where it
-holds heads alone, and 0.08 and more elsewhere. The search of a raw cloud always takes the web down to 50 mm below the
-top where a rail is seen from the side."""
+BELOW_SHARE, WEB_SHARE = 0.05, 0.25
+"""Least share of the points of a class that are below heads and as narrow about the axis as a head, where it holds
+whole rails; and their least share of all that is below heads. Measured on classes of heads alone, up to 0.03; on whole
+rails, 0.1 to 0.6 and 0.3 to 0.9; on flanks that beams from the air show, 0.05 to 0.13 and 0.3 to 0.7. Ridges of images
+have most of these points beside the axis, up to 0.15, and they show that the cloud is blunt. The search of a raw cloud
+always takes the web down to 50 mm below the top where a rail is seen from the side."""
 
 RECESS_M = (0.015, 0.05)
 """Distances of a web from the face above it: 20 mm or more on every standard, and the undersides of heads are between;
@@ -150,14 +152,15 @@ def heads_of(points: RailPoints) -> RailPoints:
     """
     if points.found and points.blunt:
         return points
-    kept = on_heads(points.xyz, points.found)
+    kept = on_heads(points.xyz, points.found, points.strips)
     return points if kept.all() else points.kept(kept)
 
 
-def on_heads(xyz: np.ndarray, found: bool = False) -> np.ndarray:
+def on_heads(xyz: np.ndarray, found: bool = False, strips: np.ndarray | None = None) -> np.ndarray:
     """Return which points of rails are not below a head, (n,) bool, given (n, 3) local metres.
 
-    They are those of a class, or those that were `found` in a raw cloud.
+    They are those of a class, or those that were `found` in a raw cloud. Each of the strips, (n,), may show something
+    else: a scanner heads alone, and images what is around them, too.
     """
     if not len(xyz):
         return np.zeros(0, dtype=bool)
@@ -178,9 +181,14 @@ def on_heads(xyz: np.ndarray, found: bool = False) -> np.ndarray:
         depth_m += step
     noise_m = _noise(depth_m)
     below = depth_m > HEAD_M + NOISE_SIGMAS * noise_m
-    if found or np.mean(below & (depth_m <= RAIL_M)) > BELOW_SHARE:
+    whole = (
+        np.ones(len(xyz), dtype=bool)
+        if found
+        else _are_whole(below & (depth_m <= RAIL_M), np.abs(across_m) <= WIDEST_M / 2, strips)
+    )
+    if whole.any():
         higher_m = np.abs(slope).astype(np.float32) * HALF_LENGTH_M[0] / 2  # the crown is that of the upper points
-        below |= depth_m - higher_m[place] > max(FACES_M + noise_m, FACES_SIGMAS * noise_m)
+        below |= whole & (depth_m - higher_m[place] > max(FACES_M + noise_m, FACES_SIGMAS * noise_m))
     off_m = np.full(len(xyz), np.inf, dtype=np.float32)
     for edge in faces.astype(np.float32).T:
         np.fmin(off_m, np.abs(across_m - edge[place]), out=off_m)
@@ -189,6 +197,16 @@ def on_heads(xyz: np.ndarray, found: bool = False) -> np.ndarray:
     recessed = (off_m > RECESS_M[0] + SCATTER_SIGMAS * scatter_m) & (off_m < RECESS_M[1])
     recessed &= depth_m > FACE_M[1] + noise_m
     return ~((recessed | below) & (depth_m <= RAIL_M))
+
+
+def _are_whole(below: np.ndarray, narrow: np.ndarray, strips: np.ndarray | None) -> np.ndarray:
+    """Return which points are of strips that hold whole rails, (n,) bool.
+
+    It is given which points are below heads, and which are as narrow about the axis as a head, (n,) bool each.
+    """
+    number = np.zeros(len(below), dtype=np.int64) if strips is None else np.unique(strips, return_inverse=True)[1]
+    deep, webs = np.bincount(number, below), np.bincount(number, below & narrow)
+    return ((webs > BELOW_SHARE * np.bincount(number)) & (webs > WEB_SHARE * deep))[number]
 
 
 def _thinned(place: np.ndarray) -> np.ndarray:
