@@ -51,7 +51,7 @@ on a bed of 0.38 and more."""
 SINGLE_FALL = 0.6
 """Steepest fall of the ground beside a rail without a partner, on the flatter side that is seen. Planes of the bed do
 not follow slopes of 0.7 and more: cells of 0.5 m then differ by more than neighbours may. Measured: 0.93 to 1.0 at the
-crest of a cutting, 0.15 at most beside rails."""
+crest of a cutting, 0.05 and 0.15 on both sides of one rail."""
 
 SINGLE_DEPTH = 0.4
 """Share of its height above the bed by which the ground on either side of a rail without a partner is lower. The plane

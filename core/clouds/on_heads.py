@@ -181,12 +181,8 @@ def on_heads(xyz: np.ndarray, found: bool = False, strips: np.ndarray | None = N
         depth_m += step
     noise_m = _noise(depth_m)
     below = depth_m > HEAD_M + NOISE_SIGMAS * noise_m
-    whole = (
-        np.ones(len(xyz), dtype=bool)
-        if found
-        else _are_whole(below & (depth_m <= RAIL_M), np.abs(across_m) <= WIDEST_M / 2, strips)
-    )
-    if whole.any():
+    whole = found or _are_whole(below & (depth_m <= RAIL_M), np.abs(across_m) <= WIDEST_M / 2, strips)
+    if np.any(whole):
         higher_m = np.abs(slope).astype(np.float32) * HALF_LENGTH_M[0] / 2  # the crown is that of the upper points
         below |= whole & (depth_m - higher_m[place] > max(FACES_M + noise_m, FACES_SIGMAS * noise_m))
     off_m = np.full(len(xyz), np.inf, dtype=np.float32)

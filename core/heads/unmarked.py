@@ -142,8 +142,8 @@ def _strips_of(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the strip of each point, (n,) from 1, and the number of passes of each strip, (k,).
 
-    It is unknown which pass shows a section alone. A level with twice or three times as many points
-    as another is of as many passes.
+    It is unknown which pass shows a section alone. A level with twice or three times as many points as another is of as
+    many passes.
     """
     strips, best = np.full(count, UNKNOWN), np.zeros(count)
     counts = np.zeros(len(levels.up_m))
