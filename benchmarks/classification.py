@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 from processes import processes
 from rail_extract.__main__ import main as main_of_commands
-from rail_extract.core.classify import square
+from rail_extract.core.classify import bars, cells, square
 from rail_extract.core.clouds.las import laspy
 from rail_extract.core.frpdf.models import NAMES
 from rail_extract.core.labelling import files, finding
@@ -102,25 +102,16 @@ STAGES = (
     (square.Bed, "under", "1 bed"),
     (square.Grid, "around", "2 tops"),
     (square, "tops_of", "2 tops"),
-    (square.Candidates, "find", "2 tops"),
-    (square, "find_lines", "3 lines"),
-    (square, "centred", "3 lines"),
-    (square, "stands_free", "4 sides"),
-    (square, "_paired", "5 partner"),
-    (square, "runs_inside", "5 partner"),
-    (square, "links", "6 pieces"),
-    (square, "_certain", "6 pieces"),
-    (square, "lower_than_beside", "6 pieces"),
-    (square, "_long", "6 pieces"),
-    (square, "_completed", "7 labels"),
-    (square, "whole_heads", "7 labels"),
-    (square, "label", "7 labels"),
-    (square, "_by_shape", "7 labels"),
-    (square, "_are_rails", "7 labels"),
-    (square.Near, "find", "7 labels"),
-    (square.Near, "on", "7 labels"),
-    (square.Ridges, "measure", "blunt heads"),
-    (square, "on_crests", "blunt heads"),
+    (cells.Candidates, "find", "2 tops"),
+    (cells, "on_lines", "3 lines"),
+    (square, "free_standing", "4 sides"),
+    (cells, "with_pairs", "5 partner"),
+    (cells, "on_rails", "6 pieces"),
+    (cells, "runs_inside", "5 partner"),
+    (square, "on_bars", "7 labels"),
+    (bars, "_with_kept_partners", "6 pieces"),
+    (square, "on_ridges", "blunt heads"),
+    (square, "on_low", "low heads"),
     (square, "flush_rails", "8 flush rails"),
     (square, "_standing_figures", "figures"),
     (square, "_flush_figures", "figures"),
