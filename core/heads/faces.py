@@ -14,7 +14,7 @@ from scipy.ndimage import median_filter
 
 from .head_points import MIN_ON_HEAD, HeadPoints
 from .level import MIN_NOISE_M, rough_level
-from .outline import FACE_DEPTH_M, VIEWS_DEG, Grid, Outline, fit_section, log_likelihood
+from .outline import FACE_DEPTH_M, FACES, Grid, Outline, fit_section, log_likelihood
 from .sections import MIN_SECTION_POINTS, borders
 
 MAX_BAND_SHARE, BAND_PERCENTILES = 0.4, (5.0, 95.0)
@@ -188,9 +188,9 @@ def _as_high(points: HeadPoints) -> tuple[HeadPoints, np.ndarray]:
 def _fits(across: np.ndarray, up: np.ndarray, head_width_m: float) -> list[_Fit]:
     """Fit a head to points, by offsets from their middle and heights, (n,), as a crown and as either face.
 
-    The likeliest fit comes first.
+    The likeliest fit comes first. So few points do not distinguish a line of sight behind an edge from a face.
     """
-    grid, outline, half_m = Grid.of(head_width_m), Outline.of(head_width_m), 0.5 * head_width_m
+    grid, outline, half_m = Grid.of(head_width_m), Outline.of(head_width_m, rays_deg=()), 0.5 * head_width_m
     fits = []
     for left_m, top_m in ((0.0, 0.0), (-half_m, TOP_ABOVE_M), (half_m, TOP_ABOVE_M)):
         bins = grid.number(across - left_m, up - top_m)
@@ -200,7 +200,7 @@ def _fits(across: np.ndarray, up: np.ndarray, head_width_m: float) -> list[_Fit]
         likelihood = log_likelihood(counts, section, outline, grid) + outside * np.log(stray / grid.size)
         axis_m = left_m + float(section.place[0])
         side = int(np.sign(axis_m)) if abs(axis_m) > OFF_AXIS * head_width_m else 0
-        shares = (outside + stray * counts.sum()) / len(up), float(section.shares[len(VIEWS_DEG) : -1].sum())
+        shares = (outside + stray * counts.sum()) / len(up), float(section.shares[FACES].sum())
         noise_m = float(np.exp(section.place[4:6].max()))
         fits.append(_Fit(likelihood, axis_m, top_m + float(section.place[1]), side, *shares, noise_m))
     return sorted(fits, key=lambda fit: -fit.likelihood)

@@ -7,6 +7,7 @@ from. See docs/method.md section 6.7.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,11 +25,19 @@ face draw the axis towards the scanner, 0.7 mm where they reach 2.5 mm further; 
 FACE_TURN = np.pi / 4
 """Angle between the axis and the normal of the surface from which a classification may leave the surface out."""
 
+RAYS_DEG, RAY_M = (12.0, 25.0, 45.0, 65.0), 0.06
+"""Angles above the horizontal from which a beam may meet both the far edge of a head and what is behind it, whose
+distance is then in between; and length of the line of sight behind the edge on which such points are. A scanner on
+the track itself sees the nearest edges at 70°."""
+
 SAMPLE_M = 0.002
 """Largest distance between samples of the outline: finer than the noise of any cloud."""
 
 VIEWS_DEG = (5.0, 12.0, 22.0, 40.0, 90.0, 140.0, 158.0, 168.0, 175.0)
 """Angles of view above the horizontal on the right; scanners and passes may see a head from several."""
+
+FACES = slice(len(VIEWS_DEG), len(VIEWS_DEG) + 6)
+"""Parts of the outline that are its lower corners and its faces, in two halves, on either side; see `Outline`."""
 
 BIN_M = 0.002
 """Side of the bins in which points are counted."""
@@ -95,7 +104,8 @@ class Outline:
     Samples, (j,), are `left` of the axis and `up` above the top, metres. `widening` is how far each moves to the left
     if the head is a metre wider, `falling` how far it falls per bend of the crown, m². `parts`, (k, j), are the points
     of each part by sample; rows sum to 1. The first parts are what is seen of the crown and the upper corners from each
-    view, the others are the lower corners and the faces, which classifications may leave out.
+    view. Those of `FACES` are the lower corners and the faces, which classifications may leave out. The last ones are
+    lines of sight behind either edge, which are on no part of the head.
     """
 
     left: np.ndarray
@@ -105,7 +115,7 @@ class Outline:
     parts: np.ndarray
 
     @classmethod
-    def of(cls, head_width_m: float) -> Outline:
+    def of(cls, head_width_m: float, rays_deg: Sequence[float] = RAYS_DEG) -> Outline:
         """Sample the outline of a head. Rays at equal angles meet a surface in proportion to how it faces them."""
         half = 0.5 * head_width_m
         inner, reach = half - CORNER_RADIUS_M, CROWN_RADIUS_M - CORNER_RADIUS_M
@@ -123,14 +133,24 @@ class Outline:
                 down, size = _samples(first, last, 1.0)
                 level = np.full(len(down), side * 0.5 * np.pi)
                 pieces.append((np.full(len(down), side * half), -down, level, size))
-        left, up, turn, size = (np.concatenate(column) for column in zip(*pieces))
+        rays = [_behind(side, np.radians(ray), inner, drop) for side in (-1, 1) for ray in rays_deg]
+        left, up, turn, size = (np.concatenate(column) for column in zip(*pieces, *rays))
+        number = np.repeat(np.arange(len(pieces) + len(rays)), [len(piece[0]) for piece in pieces + rays])
+        is_open = (np.abs(turn) < FACE_TURN) & (number < len(pieces))
         seen = np.sin(np.radians(VIEWS_DEG)[:, None] + turn) * size
-        number = np.repeat(np.arange(len(pieces)), [len(piece[0]) for piece in pieces])
-        open_parts = np.where(np.abs(turn) < FACE_TURN, np.maximum(seen, 0), 0)
-        faces = np.array([np.where(number == piece, size, 0) for piece in (2, 3, 4, 6, 7, 8)])
-        parts = np.concatenate([open_parts, faces])
+        open_parts = np.where(is_open, np.maximum(seen, 0), 0)
+        others = (2, 3, 4, 6, 7, 8, *range(len(pieces), len(pieces) + len(rays)))
+        parts = np.concatenate([open_parts, [np.where(number == piece, size, 0) for piece in others]])
         crown = np.clip(left, -inner, inner)
         return cls(left, up, crown / (2 * inner), crown**2, parts / parts.sum(axis=1, keepdims=True))
+
+
+def _behind(side: int, ray: float, inner: float, drop: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Sample a line of sight from where it touches the corner on one side: see `Outline.of` for what is returned."""
+    away, step = _samples(0.0, RAY_M, 0.5)
+    left = inner + CORNER_RADIUS_M * np.sin(ray) + away * np.cos(ray)
+    up = CORNER_RADIUS_M * np.cos(ray) - drop - away * np.sin(ray)
+    return side * left, up, np.zeros(len(away)), step
 
 
 def _samples(first: float, last: float, metres: float) -> tuple[np.ndarray, np.ndarray]:

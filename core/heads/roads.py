@@ -21,6 +21,10 @@ from .own_level import on_own_level
 BAND = (0.02, 0.98)
 """Shares of the points between which a band is measured."""
 
+ROAD_SHARE = 0.25
+"""Points per width beside a head, as a share of those on it, from which they are of a band: a road is seen as well as
+the head, and beams that meet the edge of a head and what is behind it show a tenth of its points."""
+
 MIN_WIDER_M = 0.02
 """How much wider than a head a band has to be: noise of 8 mm makes heads look 5 mm wider, two passes 15 mm."""
 
@@ -43,7 +47,9 @@ def bands(points: HeadPoints, window: int = -1) -> tuple[np.ndarray, np.ndarray]
 
     `window` is the number of the `HeadPoints.histograms`.
     """
-    sums = np.cumsum(points.histograms[window], axis=1)
+    counts = points.histograms[window]
+    head = counts[:, HALF_RANGE_BINS - HALF_HEAD_BINS : HALF_RANGE_BINS + HALF_HEAD_BINS]
+    sums = np.cumsum(np.where(counts >= ROAD_SHARE * np.median(head, axis=1)[:, None], counts, 0.0), axis=1)
     whole = np.maximum(sums[:, -1:], 1e-9)
     first, last = (np.argmax(sums >= part * whole, axis=1) for part in BAND)
     cut = (last - first + 1) * BAND[0] / (BAND[1] - BAND[0])

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 from rail_extract.core.heads.outline import (
     FACE_DEPTH_M,
+    FACES,
     MIN_STRAY_SHARE,
     Blurred,
     Grid,
@@ -43,10 +44,11 @@ def fitted(left, up, width=WIDTH):
 def test_the_outline_is_that_of_the_laboratory():
     outline = Outline.of(WIDTH)
     samples, _ = head_outline(WIDTH)
-    for left, up in zip(outline.left, outline.up):
+    on_head = outline.parts[: FACES.stop].any(axis=0)
+    for left, up in zip(outline.left[on_head], outline.up[on_head]):
         assert np.hypot(*(samples - [left, up]).T).min() < 0.0025
-    assert np.abs(outline.left).max() == pytest.approx(WIDTH / 2)
-    assert outline.up.min() > -FACE_DEPTH_M
+    assert np.abs(outline.left[on_head]).max() == pytest.approx(WIDTH / 2)
+    assert outline.up[on_head].min() > -FACE_DEPTH_M
     np.testing.assert_allclose(outline.parts.sum(axis=1), 1.0)
     np.testing.assert_allclose(np.sort(outline.left), -np.sort(-outline.left)[::-1])
 
@@ -58,6 +60,23 @@ def test_strays_do_not_pull():
     _, section, _, _ = fitted(np.append(left, strays[0]), np.append(up, strays[1]))
     assert abs(section.place[0]) < 0.0015
     assert MIN_STRAY_SHARE < section.shares[-1] < 0.2
+
+
+@pytest.mark.parametrize("angle_deg", [20, 40, 65])
+def test_beams_that_meet_the_far_edge_and_what_is_behind_it_do_not_widen_the_head(angle_deg):
+    random, ray = np.random.default_rng(0), np.radians(angle_deg)
+    left, up = seen_from(angle_deg, 0.8, 0.005)
+    edge, away = seen_edge(ray), random.uniform(0.0, 0.06, len(left) // 12)
+    noise = random.normal(0.0, 0.005, (2, len(away)))
+    behind = edge[0] - away * np.cos(ray) + noise[0], edge[1] - away * np.sin(ray) + noise[1]
+    _, section, _, _ = fitted(np.append(left, behind[0]), np.append(up, behind[1]))
+    assert abs(section.place[0]) < 0.001
+
+
+def seen_edge(ray):
+    """The place on the outline, on the right, where a line of sight from the left at an angle touches it, (2,)."""
+    samples, _ = head_outline(WIDTH)
+    return samples[np.argmax(samples @ [-np.sin(ray), np.cos(ray)])]
 
 
 def test_derivatives_are_those_of_the_density():
