@@ -19,9 +19,10 @@ from ..progress import SILENT, Progress
 SPUR_M = 1.0
 """A shorter branch with a free end is a weed on the side of the rail; a longer one may continue beyond a gap."""
 
-RUNG_HEADS = 3.0
+RUNG_HEADS = 4.0
 RUNG_DEG = 30.0
-"""A shorter and steeper line between two rails is a rung: cells across the flangeway."""
+"""A shorter and steeper line between two rails is a rung: cells across the flangeway, or where two blunt heads begin to
+be one ridge, 0.2 m apart and more."""
 
 DEFLECTION_DEG = 15.0
 """A rail turns by less where it passes through a node; the steepest turnouts in use leave at about 14 degrees."""

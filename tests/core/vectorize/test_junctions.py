@@ -38,3 +38,13 @@ def test_a_hole_in_a_rail_is_no_second_rail(long, lines):
     if lines == 1:
         np.testing.assert_allclose(clean.lines[0][:, 1], 0.0, atol=1e-12)
         np.testing.assert_allclose(clean.lengths(), 20.0)
+
+
+def test_cells_between_two_rails_of_blunt_clouds_are_no_rail():
+    """In worlds 9862 and 9926, such a rung was longer than three heads of 67 mm, and a rail began at it."""
+    y = 0.21
+    nodes = np.array([[0.0, 0.0], [10.0, 0.0], [20.0, 0.0], [0.0, y], [10.05, y], [20.0, y]])
+    ends = np.array([[0, 1], [1, 2], [3, 4], [4, 5], [1, 4]])
+    clean = clean_junctions(LineNetwork(tuple(nodes[pair] for pair in ends), nodes, ends), 0.067)
+    assert sorted(np.round(clean.lengths(), 3)) == [20.0, 20.0]
+    assert all(np.ptp(line[:, 1]) == 0 for line in clean.lines)

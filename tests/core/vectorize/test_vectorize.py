@@ -231,3 +231,15 @@ def test_a_weed_on_the_side_of_a_rail_is_not_a_branch():
     rail = straight(20, 0.3)
     weed = rail.mean(axis=0) + np.outer([0.0, 0.8], [0.0, 1.0])
     assert len(vectorize(draw([rail, weed]), HEAD_M, min_length_m=0.3).lines) == 1
+
+
+@pytest.mark.parametrize("aside_m", [0.16, 0.2])
+def test_a_crossing_whose_leg_a_wing_rail_bends_sharply_is_two_rails(aside_m):
+    """In world 9842, such a leg was cut as a kink, so that the crossing lacked it: the rails changed places."""
+    slope = 1 / 12
+    falling = np.array([[-30.0, 30 * slope], [-1.8, 1.8 * slope], [-0.7, aside_m], [-0.67, 0.0], [30.0, -30 * slope]])
+    lines = smoothed(draw([falling, np.array([[-30.0, -30 * slope], [30.0, 30 * slope]])]))
+    assert len(lines) == 2
+    for line in lines:
+        sign = np.sign((line[-1] - line[0]).prod())
+        assert np.abs(line[:, 1] - sign * slope * line[:, 0]).max() < 0.05
