@@ -136,9 +136,8 @@ class Outline:
         rays = [_behind(side, np.radians(ray), inner, drop) for side in (-1, 1) for ray in rays_deg]
         left, up, turn, size = (np.concatenate(column) for column in zip(*pieces, *rays))
         number = np.repeat(np.arange(len(pieces) + len(rays)), [len(piece[0]) for piece in pieces + rays])
-        is_open = (np.abs(turn) < FACE_TURN) & (number < len(pieces))
         seen = np.sin(np.radians(VIEWS_DEG)[:, None] + turn) * size
-        open_parts = np.where(is_open, np.maximum(seen, 0), 0)
+        open_parts = np.where(np.abs(turn) < FACE_TURN, np.maximum(seen, 0), 0)
         others = (2, 3, 4, 6, 7, 8, *range(len(pieces), len(pieces) + len(rays)))
         parts = np.concatenate([open_parts, [np.where(number == piece, size, 0) for piece in others]])
         crown = np.clip(left, -inner, inner)
@@ -146,11 +145,14 @@ class Outline:
 
 
 def _behind(side: int, ray: float, inner: float, drop: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Sample a line of sight from where it touches the corner on one side: see `Outline.of` for what is returned."""
+    """Sample a line of sight from where it touches the corner on one side.
+
+    Returns offsets to the left and heights of the samples, angles of a surface that is on no crown, and lengths.
+    """
     away, step = _samples(0.0, RAY_M, 0.5)
     left = inner + CORNER_RADIUS_M * np.sin(ray) + away * np.cos(ray)
     up = CORNER_RADIUS_M * np.cos(ray) - drop - away * np.sin(ray)
-    return side * left, up, np.zeros(len(away)), step
+    return side * left, up, np.full(len(away), side * 0.5 * np.pi), step
 
 
 def _samples(first: float, last: float, metres: float) -> tuple[np.ndarray, np.ndarray]:
