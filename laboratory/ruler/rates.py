@@ -75,8 +75,9 @@ def summary(lines: Sequence[Line]) -> Iterator[str]:
     yield ""
     yield from causes(failed)
     yield ""
-    yield from by_survey(lines)
-    yield ""
+    for name in ("survey", "layout"):
+        yield from by_group(lines, name)
+        yield ""
     yield from calibration(lines)
 
 
@@ -95,15 +96,15 @@ def causes(failed: Sequence[Line]) -> Iterator[str]:
         yield f"{cause:<22}{len(some):>7}{alone:>7}  {seeds}{more}"
 
 
-def by_survey(lines: Sequence[Line]) -> Iterator[str]:
-    """Yield a row for each kind of survey: failures, and quantiles over its worlds of the errors in millimetres."""
+def by_group(lines: Sequence[Line], name: str) -> Iterator[str]:
+    """Yield a row for each kind of survey, or of layout: failures, and quantiles of the errors of its worlds, in mm."""
     yield f"{'':<12}{'':>7}{'':>6}{'':>8}{'across, mm':>26}{'height, mm':>26}"
-    yield f"{'survey':<12}{'worlds':>7}{'fail':>6}{'silent':>8}" + 2 * f"{'median':>12}{'90 %':>7}{'99 %':>7}"
+    yield f"{name:<12}{'worlds':>7}{'fail':>6}{'silent':>8}" + 2 * f"{'median':>12}{'90 %':>7}{'99 %':>7}"
     groups: dict[str, list[Line]] = defaultdict(list)
     for line in lines:
-        groups[line["world"]["survey"]].append(line)
-    for name, some in sorted(groups.items()):
-        cells = [f"{name:<12}{len(some):>7}{sum(bool(one['faults']) for one in some):>6}{sum(map(is_silent, some)):>8}"]
+        groups[line["world"][name]].append(line)
+    for group, some in sorted(groups.items()):
+        cells = [f"{group:<12}{len(some):>7}{sum(bool(one['faults']) for one in some):>6}{sum(map(is_silent, some)):>8}"]
         for figure in ("across mm", "height mm"):
             values = [one[figure] for one in some if one.get(figure) is not None]
             middle, high, highest = np.percentile(values, (50, 90, 99)) if values else [np.nan] * 3

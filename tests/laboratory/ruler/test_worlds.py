@@ -116,7 +116,7 @@ def test_the_summary_lists_causes_with_their_seeds():
             "seed": seed,
             "seconds": 9.0,
             "faults": [{"cause": MISSING, "silent": seed == 4}] if seed in (4, 7) else [],
-            "world": {"survey": "mobile"},
+            "world": {"survey": "mobile", "layout": "ladder" if seed < 5 else "plain"},
             "across mm": 1.0,
             "height mm": 0.5,
             "within": {"n m": 100.0, "across 1": 70.0, "across 2": 95.0, "height 1": 68.0, "height 2": 96.0},
@@ -129,6 +129,9 @@ def test_the_summary_lists_causes_with_their_seeds():
     assert "rail not found" in text
     assert "4! 7" in text
     assert "70.0 % within the standard error" in text
+    rows = [line.split()[:4] for line in text.splitlines()]
+    assert ["ladder", "4", "1", "1"] in rows
+    assert ["plain", "6", "1", "0"] in rows
 
 
 @pytest.mark.parametrize(("kind", "expected"), [("mobile", True), ("drone", False)])
