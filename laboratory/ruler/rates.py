@@ -104,7 +104,8 @@ def by_group(lines: Sequence[Line], name: str) -> Iterator[str]:
     for line in lines:
         groups[line["world"][name]].append(line)
     for group, some in sorted(groups.items()):
-        cells = [f"{group:<12}{len(some):>7}{sum(bool(one['faults']) for one in some):>6}{sum(map(is_silent, some)):>8}"]
+        failed, silent = sum(bool(one["faults"]) for one in some), sum(map(is_silent, some))
+        cells = [f"{group:<12}{len(some):>7}{failed:>6}{silent:>8}"]
         for figure in ("across mm", "height mm"):
             values = [one[figure] for one in some if one.get(figure) is not None]
             middle, high, highest = np.percentile(values, (50, 90, 99)) if values else [np.nan] * 3
