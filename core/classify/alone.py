@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from .lines import Lines
 from .partner import SPACING_M
-from .pieces import mean_of
+from .pieces import mean_of, to_one_side
 from .settings import Settings
 from .tops import HIGH_M, MILLIMETRES, Tops
 
@@ -84,7 +84,7 @@ def slopes_beside(lines: Lines, piece: np.ndarray, cells: np.ndarray, tops: Tops
     are compared: the planes of the bed do not follow a slope of more than `bed.NEIGHBOUR_M` from one cell to the next.
     """
     count, z = int(piece.max()) + 1 if len(piece) else 0, tops.z.ravel()
-    across, slopes = _to_one_side(lines, piece), np.full((2, count), np.inf)
+    across, slopes = to_one_side(lines, piece), np.full((2, count), np.inf)
     for number, side in enumerate((1, -1)):
         seen, fall = np.zeros((2, len(BESIDE_LINE_M), count))
         for place, beside_m in enumerate(BESIDE_LINE_M):
@@ -107,19 +107,12 @@ def _slope(weight: np.ndarray, fall_m: np.ndarray) -> np.ndarray:
     return (weight * centred * fall_m).sum(axis=0) / (weight * centred**2).sum(axis=0)
 
 
-def _to_one_side(lines: Lines, piece: np.ndarray) -> np.ndarray:
-    """Return unit vectors across the lines, (n, 2), to the same side on all of a piece: lines have no direction."""
-    across = lines.across
-    first = across[np.unique(piece, return_index=True)[1]]
-    return np.where(np.einsum("ij,ij->i", across, first[piece])[:, None] < 0, -across, across)
-
-
 def _lower(lines: Lines, piece: np.ndarray, places_m: np.ndarray, low_m: np.ndarray, tops: Tops) -> np.ndarray:
     """Return the share of cells that show ground lower than `low_m`, (n,), and nothing else, for each piece, (pieces,).
 
     They are at several places to one side of the lines.
     """
-    across, lower = _to_one_side(lines, piece), np.zeros(len(piece))
+    across, lower = to_one_side(lines, piece), np.zeros(len(piece))
     for place_m in places_m:
         cell, inside = tops.grid.cells(lines.axis + place_m * across)
         seen = inside & tops.seen.ravel()[cell] & ~tops.high.ravel()[cell]
@@ -139,7 +132,7 @@ def are_solid(lines: Lines, piece: np.ndarray, xy: np.ndarray, height: np.ndarra
     near = np.flatnonzero((height > lines.height.min() - BELOW_M[1]) & (height < lines.height.max() - FACE_M[0]))
     distance_m, cell = cKDTree(lines.axis).query(xy[near], distance_upper_bound=NEAR_M)
     near, cell = near[np.isfinite(distance_m)], cell[np.isfinite(distance_m)]
-    across = np.einsum("ij,ij->i", xy[near] - lines.axis[cell], _to_one_side(lines, piece)[cell])
+    across = np.einsum("ij,ij->i", xy[near] - lines.axis[cell], to_one_side(lines, piece)[cell])
     depth, number = lines.height[cell] - height[near], piece[cell]
     for one in np.flatnonzero(mean_m >= BELOW_M[1] + BED_M):
         mine = number == one

@@ -58,10 +58,9 @@ SINGLE_DEPTH = 0.4
 of the bed bends at the crest of a bank, which then seems to be high. Measured: 0.31 to 0.35 there, and 0.55 and more
 on rails beside which the ground is seen."""
 
-SHARP_WIDER_M = 0.016
+SHARP_WIDER_M = 0.008
 """Width beyond that of a head up to which a piece shows that the cloud is sharp. Measured over half of the rails of a
-cloud and more: up to 11 mm by scanners on vehicles, 13 mm by wide beams from the air, and from 20 mm on in images that
-blur by 3 cm, where a wider limit kept one rail and dropped the next."""
+cloud and more: up to 5 mm by scanners, and from 11 mm on in images that blur by 2 cm."""
 
 
 def on_bars(
@@ -72,7 +71,7 @@ def on_bars(
     chosen = label(shown.tops, heads, shown.cell, shown.height, tolerances)
     beside = Near.find(shown.xy[chosen], kept.lines)
     piece = pieces_of(len(kept.cell), kept.pairs)
-    width_m, share_m = beside.widths(piece), own_lengths(kept, settings)
+    width_m, share_m = beside.widths(kept.lines, piece), own_lengths(kept, settings)
     narrow = (width_m < settings.head_width_m + tolerances.wider_m)[piece]
     kinds = _by_shape(kept, piece, width_m, narrow, shown, settings)
     sharp_m, round_m, unsure_m = (float(share_m[kind].sum()) for kind in kinds)
@@ -137,7 +136,7 @@ def _are_rails(kept: Kept, beside: Near, shown: Shown, settings: Settings, toler
     if partnered.all():
         return partnered
     piece = pieces_of(len(kept.cell), kept.pairs)
-    width_m, height_m = beside.widths(piece), mean_of(kept.lines.height, piece)
+    width_m, height_m = beside.widths(kept.lines, piece), mean_of(kept.lines.height, piece)
     narrow = width_m < settings.head_width_m + tolerances.wider_single_m
     narrow &= width_m >= SINGLE_WIDTH * settings.head_width_m
     high = height_m >= SINGLE_HEIGHT_M

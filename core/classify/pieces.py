@@ -89,6 +89,13 @@ def mean_of(values: np.ndarray, piece: np.ndarray) -> np.ndarray:
     return np.bincount(piece, values) / np.bincount(piece)
 
 
+def to_one_side(lines: Lines, piece: np.ndarray) -> np.ndarray:
+    """Return unit vectors across the lines, (n, 2), to the same side on all of a piece: lines have no direction."""
+    across = lines.across
+    first = across[np.unique(piece, return_index=True)[1]]
+    return np.where(np.einsum("ij,ij->i", across, first[piece])[:, None] < 0, -across, across)
+
+
 def long_enough(
     lines: Lines,
     pairs: np.ndarray,

@@ -55,7 +55,7 @@ class Tolerances:
         Tops that may be those of rails.
     wider_m, wider_single_m : float
         Width beyond that of a head up to which the top of a piece may be one, with a partner and without. Measured: up
-        to 8 mm, and 42 mm on thin clouds; kerbs of 150 mm 42 mm, on thin clouds 63 mm.
+        to 17 mm, and 41 mm on thin clouds; kerbs of 150 mm 62 mm, on thin clouds 59 mm.
     """
 
     along_m: float
