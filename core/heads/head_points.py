@@ -60,23 +60,26 @@ unbiased."""
 MAX_ABOVE_SIGMAS = 3.0
 """Height above the top, in standard deviations of the noise, beyond which a point is a weed."""
 
-BLENDED_M = 0.006
-"""Fall of both rims of a head below its crown from which beams blend the head and the ballast, as those from the air
-do. Seen by narrow beams, the round corners fall by 1 to 2 mm, and the rim of a line that is off the head by more, but
-not both."""
+SECTION_M = 8.25
+"""Length of the sections of lines that are asked for blunt heads, those of the longest window: a line that is off its
+head is so by the same over it, and tripods on either side of a track see faces on one side of the head."""
 
-FACE_SPREADS, FACE_SHARES = 2.5, (0.6, 1.5)
-"""Least spread of the heights on a rim, in spreads on the crown, and its limits as shares of the fall, between which
-they are on the upright face of a sharp head. On a rim of each head that tripods on either side of a track saw, it was
-2.8 to 9 times as large and 0.8 to 1.3 times the fall; blended by the beams of drones and by images, 0.8 to 2.2 times,
-and beside the crest of such a ridge more than 1.8 times the fall."""
+MIN_ON_SECTION = 5
+"""Least points on the crown and on either rim of a section: with noise of 15 mm, medians of so few are 8 mm off, and
+half of ten sections are 3 mm off."""
 
-CROWN_HEADS, RIM_HEADS, SHOULDER_HEADS = 0.2, (0.3, 0.5), (0.55, 0.75)
-"""Parts of the head width on either side of the axis: the crown, the rims, and what is beyond a head that is not
-blurred."""
+BLENDED_M = 0.0045
+"""Fall of rims or shoulders of a head below its crown from which beams or images blend the head and the ballast. In 44
+random clouds, narrow beams see them fall by 1 to 3.7 mm (median of the sections), because corners are round and tripods
+see faces; blended by images and by beams more than 0.3 times as wide as the head, they fall by 5.5 to 40 mm."""
 
-SHOULDER_SHARE = 0.2
-"""Points per width on either shoulder, as a share of those on the crown, from which a blurred head goes on there."""
+CROWN_HEADS, RIM_HEADS, SHOULDER_HEADS = 0.2, (0.3, 0.45), (0.55, 0.75)
+"""Parts of the head width on either side of the axis: the crown, the rims without the corners, and what is beyond a
+head that is not blurred."""
+
+CREST_SHARE = 0.2
+"""Points within `CROWN_HEADS` of a place, as a share of those at the fullest one, from which it may be the crest; and
+points per width on either shoulder, by those on the crown, from which a blurred head goes on there."""
 
 ASIDE_HEADS, ASIDE_PLACES = 0.6, 25
 """Distance from a line, in head widths, within which the crest of a strip is looked for, 4 cm by which surveys may be
@@ -164,28 +167,6 @@ class HeadPoints:
     def within(self, share: float) -> np.ndarray:
         """Return which points are this close to the line, in head widths, (n,) bool."""
         return np.abs(self.across) <= share * self.width_m
-
-    @property
-    def looks_blunt(self) -> bool:
-        """Whether heights fall from the crown to both sides, so that the head has no edges that could be seen.
-
-        Beams from the air show this on the rims of the head, dense matching of photographs on shoulders beyond them.
-        """
-        near = self[self.within(SHOULDER_HEADS[1])]
-        head = near.within(RIM_HEADS[1])
-        if head.sum() < MIN_ON_HEAD:
-            return False
-        level = rough_level(near.t[head], near.z[head])
-        above, heads = near.z - np.interp(near.t, near.t[head], level), near.across / self.width_m
-        crown = np.abs(heads) < CROWN_HEADS
-        if not crown.any():
-            return False
-        for low, high in (RIM_HEADS, SHOULDER_HEADS):
-            sides = [above[(side * heads > low) & (side * heads <= high)] for side in (1, -1)]
-            least = max(SHOULDER_SHARE * (high - low) / (2 * CROWN_HEADS) * crown.sum(), 1) if low > RIM_HEADS[0] else 1
-            if min(map(len, sides)) >= least and min(_fall(above[crown], side) for side in sides) > BLENDED_M:
-                return True
-        return False
 
     @cached_property
     def top(self) -> tuple[np.ndarray, float]:
@@ -275,9 +256,9 @@ def judged(points: RailPoints, lines: Sequence[np.ndarray], widths: Widths) -> R
 
 
 def about_crest(points: HeadPoints) -> HeadPoints:
-    """Return the points of a strip about the place across at which they are highest.
+    """Return points about the place across at which they are highest.
 
-    The strip may lie aside of a line that several show. A sharp head is level: seen from any place on it, heights do
+    The line may be aside of the head. A sharp head is level: seen from any place on it, heights do
     not fall to both sides.
     """
     if not len(points.t):
@@ -288,7 +269,7 @@ def about_crest(points: HeadPoints) -> HeadPoints:
     places = np.linspace(-ASIDE_HEADS, ASIDE_HEADS, ASIDE_PLACES) * points.width_m
     first, last = (np.searchsorted(across, places + step) for step in (-half_m, half_m))
     count = last - first
-    mean = np.where(count >= SHOULDER_SHARE * count.max(), (sums[last] - sums[first]) / np.maximum(count, 1), -np.inf)
+    mean = np.where(count >= CREST_SHARE * count.max(), (sums[last] - sums[first]) / np.maximum(count, 1), -np.inf)
     return replace(points, across=points.across - places[np.argmax(mean)])
 
 
@@ -296,23 +277,42 @@ def lengths_by_kind(heads: Sequence[HeadPoints]) -> np.ndarray:
     """Return the lengths of lines that show sharp heads and blunt ones, (2,) metres."""
     shown_m = np.zeros(2)
     for points in heads:
-        if len(points.t):
-            shown_m[int(points.looks_blunt)] += np.ptp(points.t)
+        falls_m = _falls(points)
+        if len(falls_m):
+            shown_m[int(np.median(falls_m) > BLENDED_M)] += np.ptp(points.t)
     return shown_m
 
 
-def _fall(crown: np.ndarray, rim: np.ndarray) -> float:
-    """Return by how much heights on a rim are below those on the crown, metres; 0 where they are on a face."""
-    fall_m, spread_m = float(np.median(crown) - np.median(rim)), robust_sigma(rim)
-    low, high = FACE_SHARES
-    is_face = spread_m > FACE_SPREADS * robust_sigma(crown) and low * fall_m < spread_m < high * fall_m
-    return 0.0 if is_face else fall_m
-
-
 def _are_blunt(heads: Sequence[HeadPoints]) -> bool:
-    """Return whether most of the length of lines shows blunt heads."""
-    sharp_m, blunt_m = lengths_by_kind(heads)
-    return bool(blunt_m > sharp_m)
+    """Return whether most sections of all lines show blunt heads."""
+    falls_m = np.concatenate([np.empty(0), *(_falls(points) for points in heads)])
+    return bool(len(falls_m) and np.median(falls_m) > BLENDED_M)
+
+
+def _falls(points: HeadPoints) -> np.ndarray:
+    """Return by how much a head falls to both sides in each section that has enough points, (k,) metres."""
+    count = max(int(points.length_m / SECTION_M), 1)
+    section = np.minimum((points.t / points.length_m * count).astype(int), count - 1)
+    falls_m = (_fall(about_crest(points[section == number])) for number in range(count))
+    return np.array([fall_m for fall_m in falls_m if np.isfinite(fall_m)])
+
+
+def _fall(about: HeadPoints) -> float:
+    """Return by how much the rims or, if more, the shoulders of a head are below its crown, metres; NaN if unknown.
+
+    Of both sides, the higher one counts: sharp heads fall to one side, if their faces or the line aside of them do.
+    """
+    if len(about.t) < MIN_ON_SECTION:
+        return np.nan
+    heads, up = about.across / about.width_m, about.z - rough_level(about.t, about.z)
+    crown = up[np.abs(heads) < CROWN_HEADS]
+    falls_m = []
+    for (low, high), share in ((RIM_HEADS, 0.0), (SHOULDER_HEADS, CREST_SHARE)):
+        sides = [up[(side * heads > low) & (side * heads <= high)] for side in (1, -1)]
+        least = max(share * (high - low) / (2 * CROWN_HEADS) * len(crown), MIN_ON_SECTION)
+        enough = min(len(crown), *map(len, sides)) >= least
+        falls_m.append(float(np.median(crown) - max(map(np.median, sides))) if enough else np.nan)
+    return falls_m[0] if np.isnan(falls_m).any() else max(falls_m)
 
 
 def free_edges(

@@ -17,7 +17,7 @@ from ..frpdf.engine import Engine
 from ..frpdf.models import choose
 from ..frpdf.weights import load_arrays
 from ..heads.elevation import ElevationParameters, elevate, flat_rail, flat_rails, numbered
-from ..heads.head_points import about_crest, judged, lengths_by_kind, near_lines
+from ..heads.head_points import judged, lengths_by_kind, near_lines
 from ..heads.refinement import refine
 from ..heads.roads import onto_heads
 from ..heads.strips import measure_strips, rows_of
@@ -120,7 +120,7 @@ def _kinds(
     lines, rows = [rail.xyz[:, :2] for rail in rails], []
     for strip in strips.tolist() if lines else []:
         near = near_lines(lines, source.of_strips([strip]).near(square, 0.0).xyz, parameters.head_width_m, blunt=False)
-        rows.append([strip, *lengths_by_kind([about_crest(points) for points in near])])
+        rows.append([strip, *lengths_by_kind(near)])
     return np.array(rows).reshape(-1, 3)
 
 

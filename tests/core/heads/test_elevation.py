@@ -262,3 +262,15 @@ def test_a_rail_that_shows_one_face_is_as_high_as_its_top():
     (rail,) = elevated(network_of(straight_line(30.0)), cloud_of(xyz))
     assert np.median(rail.xyz[:, 2]) == pytest.approx(4.022, abs=0.005)
     assert rail.points == 3000
+
+
+@pytest.mark.parametrize("beam_heads", [0.5, 0.9, 1.1])
+def test_the_standard_error_says_how_far_beams_may_lower_a_head(beam_heads):
+    """Beams are as wide as where their power falls to 1/e²; they blend the head with what is 140 mm below it."""
+    rng = np.random.default_rng(3)
+    x, across = rng.uniform(0, 60, 2000), rng.uniform(-WIDTH / 2, WIDTH / 2, 2000)
+    rays = np.linspace(-1, 1, 101)[:, None]
+    beside = np.abs(across + rays * beam_heads * WIDTH) > WIDTH / 2
+    z = -0.14 * np.average(beside, axis=0, weights=np.exp(-8 * rays[:, 0] ** 2)) + rng.normal(0, 0.007, 2000)
+    (rail,) = elevated(network_of(straight_line(60)), cloud_of(np.column_stack([x, across, z])))
+    assert 1000 * abs(height_error(rail)[0]) < 2 * rail.sigmaz_mm < 20

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from rail_extract.core.heads.head_points import about_crest, lengths_by_kind, near_lines
+from rail_extract.core.heads.head_points import lengths_by_kind, near_lines
 
 WIDTH = 0.072
 
@@ -27,10 +27,7 @@ def test_strips_show_what_they_are_beside_a_line_that_several_show(aside_m):
     x, y = rng.uniform(0, 50, 4000), rng.uniform(-0.12, 0.12, 4000)
     ridge = np.column_stack([x, y, 0.12 * np.exp(-0.5 * ((y - aside_m) / 0.06) ** 2) + rng.normal(0, 0.006, 4000)])
     head = np.column_stack([x, aside_m + 0.3 * y, rng.normal(0, 0.003, 4000)])
-    kinds = [
-        lengths_by_kind([about_crest(one) for one in near_lines([np.array([[0.0, 0.0], [50.0, 0.0]])], xyz, WIDTH)])
-        for xyz in (head, ridge)
-    ]
+    kinds = [lengths_by_kind(near_lines([np.array([[0.0, 0.0], [50.0, 0.0]])], xyz, WIDTH)) for xyz in (head, ridge)]
     np.testing.assert_allclose(kinds, [[50, 0], [0, 50]], atol=0.5)
 
 
@@ -45,6 +42,18 @@ def test_faces_that_tripods_on_either_side_see_are_no_ridge():
     assert not near[0].is_blunt
 
 
+@pytest.mark.parametrize(("beam_m", "blunt"), [(0.055, True), (0.01, False)])
+def test_a_line_that_winds_about_its_head_shows_whether_beams_blend_it(beam_m, blunt):
+    """Along the whole line, either side is off the head as often, and heights fall to both; six points per metre."""
+    rng = np.random.RandomState(0)
+    x, y = rng.uniform(0, 100, 600), rng.uniform(-0.034, 0.034, 600)
+    beside = (np.abs(y) + rng.uniform(-0.5, 0.5, (100, 1)) * beam_m > 0.034).mean(axis=0)
+    z = -0.13 * beside + rng.normal(0, 0.007, 600)
+    seen = np.column_stack([x, y + 0.018 * np.sin(x / 4), z])
+    (near,) = near_lines([np.array([[0.0, 0.0], [100.0, 0.0]])], seen, 0.068)
+    assert near.is_blunt == blunt
+
+
 def test_a_strip_without_points_is_of_no_kind():
     empty = near_lines([np.array([[0.0, 0.0], [50.0, 0.0]])], np.empty((0, 3)), WIDTH, blunt=False)
-    assert lengths_by_kind([about_crest(one) for one in empty]).tolist() == [0, 0]
+    assert lengths_by_kind(empty).tolist() == [0, 0]
