@@ -44,7 +44,7 @@ def tip_and_direction(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 FIT_M = 4.0
-"""Length of either line that the curve is fitted to."""
+"""Length of either line that the curve is fitted to, unless more is asked for."""
 
 STAIRS_M = 0.02
 """Largest distance of a raster line from its rail: half a cell. Larger distances come from weeds or hooks."""
@@ -86,6 +86,7 @@ def bridge(
     other: np.ndarray,
     misfit_m: float = MISFIT_M,
     transition_m: float = TRANSITION_M,
+    fit_m: float = FIT_M,
 ) -> Bridge | None:
     """Fit one smooth curve to the ends of two lines, (n, 2) from the end inward, and return the part between them.
 
@@ -93,9 +94,10 @@ def bridge(
     neighbouring rail is refused because it needs two opposite bends. None if the curve misses either line by a median
     of more than `misfit_m`, bends more than a rail, or would have to turn back along a line.
 
-    `transition_m` is the shortest length in which the curvature may rise from 0 to 1 / `MIN_RADIUS_M`.
+    `transition_m` is the shortest length in which the curvature may rise from 0 to 1 / `MIN_RADIUS_M`; `fit_m` is the
+    length of either line that the curve explains.
     """
-    before, after = even_points(one, FIT_M)[::-1], even_points(other, FIT_M)
+    before, after = even_points(one, fit_m)[::-1], even_points(other, fit_m)
     origin, axes = _frame(before, after)
     before, after = (before - origin) @ axes.T, (after - origin) @ axes.T
     gap = after[0, 0] - before[-1, 0]

@@ -14,6 +14,7 @@ from ..progress import SILENT, Progress
 from ..raster import RailRaster
 from .branches import attach_branches, choose_routes, part_branches
 from .crossings import resolve_crossings
+from .detours import straighten
 from .joining import join_gaps
 from .junctions import clean_junctions, cut_kinks, run_through, weld_pairs
 from .skeleton import chamfer_distance, close, parity_fix, pixel_set, prune, trace, veinerize
@@ -58,7 +59,8 @@ def vectorize(
     seen = cKDTree(closed.to_local(pixels.cells / 2))
     network, slips = open_slips(clean_junctions(traced, head_width_m), seen)
     # Wing rails bend the legs of a crossing next to it; elsewhere, a kink may have cut off what is a leg.
-    network = resolve_crossings(cut_kinks(resolve_crossings(network), progress.span(0.6, 0.85)))
+    network = cut_kinks(resolve_crossings(network), progress.span(0.6, 0.85))
+    network = resolve_crossings(straighten(network, seen))
     network = part_branches(add_curves(network, slips))
     network = join_gaps(run_through(network), seen, max_gap_m, gap_angle_deg, progress)
     network = attach_branches(network, seen, max_gap_m, progress.span(0.9, 1.0))
