@@ -143,9 +143,13 @@ def on_lines(found: Candidates, reach_m: float, tolerances: Tolerances, settings
 
 
 def fitted_again(kept: Kept, heads: np.ndarray, found: Candidates, tolerances: Tolerances, settings: Settings) -> Kept:
-    """Fit the lines of kept cells to those of heads, (k,) in order, alone: what was dropped led them aside."""
+    """Fit the lines of kept cells to those of heads, (k,) in order, alone: what was dropped led them aside.
+
+    What all cells showed of their cover and purity stays: with fewer cells, both would mean something else.
+    """
     wanted, reach_m = np.searchsorted(heads, kept.cell), kept.lines.reach_m
     lines = find_lines(found.at(heads), reach_m, tolerances.along_m, tolerances.beside_line_m, wanted).of(wanted)
+    lines = replace(lines, cover=kept.lines.cover, pure=kept.lines.pure)
     return replace(kept, lines=_on_middles(lines, found, tolerances, settings))
 
 

@@ -54,8 +54,8 @@ class Tolerances:
     band : Band
         Tops that may be those of rails.
     wider_m, wider_single_m : float
-        Width beyond that of a head up to which the top of a piece may be one, with a partner and without. Measured: up
-        to 17 mm, and 41 mm on thin clouds; kerbs of 150 mm 62 mm, on thin clouds 59 mm.
+        Width beyond that of a head up to which the top of a piece may be one, with a partner and without. Measured
+        with a partner: up to 17 mm, and 41 mm on thin clouds; kerbs of 150 mm 62 mm, on thin clouds 59 mm.
     """
 
     along_m: float

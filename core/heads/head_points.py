@@ -61,20 +61,21 @@ MAX_ABOVE_SIGMAS = 3.0
 """Height above the top, in standard deviations of the noise, beyond which a point is a weed."""
 
 SECTION_M = 8.25
-"""Length of the sections of lines that are asked for blunt heads, those of the longest window: a line that is off its
-head is so by the same over it, and tripods on either side of a track see faces on one side of the head."""
+"""Length of the sections of a line in which it is measured how far heads fall to both sides, that of the longest
+window: over it, the distance of a line from its head hardly changes, and tripods see the faces on one side only.
+Sections are longer where they would have fewer than `MIN_ON_HEAD` points on the head."""
 
 MIN_ON_SECTION = 5
 """Least points on the crown and on either rim of a section: with noise of 15 mm, medians of so few are 8 mm off, and
-half of ten sections are 3 mm off."""
+the median of ten sections is 3 mm off."""
 
-BLENDED_M = 0.0045
+BLENDED_FALL_M = 0.0045
 """Fall of rims or shoulders of a head below its crown from which beams or images blend the head and the ballast. In 44
 random clouds, narrow beams see them fall by 1 to 3.7 mm (median of the sections), because corners are round and tripods
 see faces; blended by images and by beams more than 0.3 times as wide as the head, they fall by 5.5 to 40 mm."""
 
 CROWN_HEADS, RIM_HEADS, SHOULDER_HEADS = 0.2, (0.3, 0.45), (0.55, 0.75)
-"""Parts of the head width on either side of the axis: the crown, the rims without the corners, and what is beyond a
+"""Parts of the head width on either side of the axis: the crown, the rims short of the faces, and what is beyond a
 head that is not blurred."""
 
 CREST_SHARE = 0.2
@@ -82,7 +83,7 @@ CREST_SHARE = 0.2
 points per width on either shoulder, by those on the crown, from which a blurred head goes on there."""
 
 ASIDE_HEADS, ASIDE_PLACES = 0.6, 25
-"""Distance from a line, in head widths, within which the crest of a strip is looked for, 4 cm by which surveys may be
+"""Distance from a line, in head widths, within which the crest of a section is looked for, 4 cm by which surveys may be
 registered apart; and places at which it is, 4 mm from each other."""
 
 NO_EDGES = np.ones((2, 0), dtype=bool)
@@ -255,11 +256,11 @@ def judged(points: RailPoints, lines: Sequence[np.ndarray], widths: Widths) -> R
     return replace(points, blunt=near_lines(lines, points.xyz, widths)[0].is_blunt)
 
 
-def about_crest(points: HeadPoints) -> HeadPoints:
+def _about_crest(points: HeadPoints) -> HeadPoints:
     """Return points about the place across at which they are highest.
 
-    The line may be aside of the head. A sharp head is level: seen from any place on it, heights do
-    not fall to both sides.
+    The line may be aside of the head. A sharp head is level: seen from any place on it, heights do not fall to both
+    sides.
     """
     if not len(points.t):
         return points
@@ -279,21 +280,22 @@ def lengths_by_kind(heads: Sequence[HeadPoints]) -> np.ndarray:
     for points in heads:
         falls_m = _falls(points)
         if len(falls_m):
-            shown_m[int(np.median(falls_m) > BLENDED_M)] += np.ptp(points.t)
+            shown_m[int(np.median(falls_m) > BLENDED_FALL_M)] += np.ptp(points.t)
     return shown_m
 
 
 def _are_blunt(heads: Sequence[HeadPoints]) -> bool:
     """Return whether most sections of all lines show blunt heads."""
     falls_m = np.concatenate([np.empty(0), *(_falls(points) for points in heads)])
-    return bool(len(falls_m) and np.median(falls_m) > BLENDED_M)
+    return bool(len(falls_m) and np.median(falls_m) > BLENDED_FALL_M)
 
 
 def _falls(points: HeadPoints) -> np.ndarray:
     """Return by how much a head falls to both sides in each section that has enough points, (k,) metres."""
-    count = max(int(points.length_m / SECTION_M), 1)
+    enough = int(points.within(0.5).sum() / MIN_ON_HEAD)
+    count = max(min(int(points.length_m / SECTION_M), enough), 1)
     section = np.minimum((points.t / points.length_m * count).astype(int), count - 1)
-    falls_m = (_fall(about_crest(points[section == number])) for number in range(count))
+    falls_m = (_fall(_about_crest(points[section == number])) for number in range(count))
     return np.array([fall_m for fall_m in falls_m if np.isfinite(fall_m)])
 
 

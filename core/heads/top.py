@@ -42,11 +42,11 @@ PROFILE_BIN_M = 0.25
 TAIL_M = 1.0
 """Length over which a profile is extrapolated with the slope at its end; beyond it is level."""
 
-BLENDED_M, BLENDED_SHARE = 0.002, 0.5
-"""Least standard error of the height of a blunt head, metres, and as a share of the fall at the edge of the part that
-gives it: by as much as a beam blends that with what is beside the head, more or less, it lowers the crest. Beams half
-as wide as the head lower it by nothing, those as wide by 0.3 to 0.8 of this fall, which is 7 to 15 mm for both: a
-narrower beam falls as much above a deeper bed."""
+BLENDED_ERROR_M, BLENDED_SHARE = 0.002, 0.5
+"""Least standard error of the height of a blunt head, metres, and its share of the fall of the head at the edge of the
+part that gives the height. A beam lowers the crest by a share of this fall: by nothing if it is half as wide as the
+head, by 0.3 to 0.8 if it is as wide. The fall is 7 to 15 mm for both, because heads fall as much below a narrower beam
+above a deeper bed."""
 
 LEAST_INFORMATION = 1e-6
 """Information about level, slope and fall of a crown that is always there, so that few points are enough."""
@@ -184,7 +184,8 @@ def fit_crown(points: HeadPoints) -> Crown:
         off = above - powers @ found
         used = np.abs(off) <= OFF_TOP_SIGMAS * robust_sigma(off)
     bend = max(-found[2], 0.0)
-    blended_m = max(BLENDED_SHARE * bend * (AXIS_SHARE * points.width_m) ** 2, BLENDED_M) if points.is_blunt else 0.0
+    fall_m = bend * (AXIS_SHARE * points.width_m) ** 2
+    blended_m = max(BLENDED_SHARE * fall_m, BLENDED_ERROR_M) if points.is_blunt else 0.0
     return Crown(bend, float(np.sqrt(covariance[2, 2])), rim_m, blended_m)
 
 

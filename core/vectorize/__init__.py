@@ -59,8 +59,8 @@ def vectorize(
     seen = cKDTree(closed.to_local(pixels.cells / 2))
     network, slips = open_slips(clean_junctions(traced, head_width_m), seen)
     # Wing rails bend the legs of a crossing next to it; elsewhere, a kink may have cut off what is a leg.
-    network = cut_kinks(resolve_crossings(network), progress.span(0.6, 0.85))
-    network = resolve_crossings(straighten(network, seen))
+    network = cut_kinks(resolve_crossings(network), progress.span(0.6, 0.8))
+    network = resolve_crossings(straighten(network, seen, progress.span(0.8, 0.85)))
     network = part_branches(add_curves(network, slips))
     network = join_gaps(run_through(network), seen, max_gap_m, gap_angle_deg, progress)
     network = attach_branches(network, seen, max_gap_m, progress.span(0.9, 1.0))

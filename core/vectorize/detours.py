@@ -16,6 +16,7 @@ from scipy.spatial import cKDTree
 from ..lines.ends import FIT_M, STEADY_TRANSITION_M, STEP_M, Bridge, bridge, even_points
 from ..lines.network import LineNetwork
 from ..polyline import Polyline
+from ..progress import SILENT, Progress
 from .joining import unseen_m
 
 LENGTHS_M = (2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0)
@@ -30,7 +31,7 @@ SWERVE_DEG = 3.0
 """A detour turns away and back, so that its directions, measured over a metre, differ by this much more than those of
 its course: a change by 0.14 m within 2 m takes 4 degrees either way. A curve that a course would cut short does not."""
 
-UNSEEN_M = 0.5
+MAX_UNSEEN_M = 0.5
 """Longest part of the course away from all cells. Beside it are those of its rail or of what hides it."""
 
 APART_M = 1.0
@@ -38,9 +39,10 @@ APART_M = 1.0
 the stairs of a raster are shorter."""
 
 
-def straighten(network: LineNetwork, seen: cKDTree) -> LineNetwork:
+def straighten(network: LineNetwork, seen: cKDTree, progress: Progress = SILENT) -> LineNetwork:
     """Lead lines past their detours, given the cells, `seen`. The network has no passes yet."""
-    return replace(network, lines=tuple(_straightened(line, seen) for line in network.lines))
+    lines = progress.follow(network.lines, len(network.lines))
+    return replace(network, lines=tuple(_straightened(line, seen) for line in lines))
 
 
 def _straightened(line: np.ndarray, seen: cKDTree) -> np.ndarray:
@@ -103,7 +105,7 @@ def _course(
     if start < leg_m or end > own.length_m - leg_m:
         return None
     found = _led_past(own, start, end, leg_m)
-    if found is None or not len(found.points) or unseen_m(found.points, seen) > UNSEEN_M:
+    if found is None or not len(found.points) or unseen_m(found.points, seen) > MAX_UNSEEN_M:
         return None
     start, end = start - found.cuts_m[0], end + found.cuts_m[1]
     detour = own.part(start, end).xyz

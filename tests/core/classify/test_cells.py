@@ -27,3 +27,4 @@ def test_lines_are_fitted_again_without_what_is_dropped():
     again = fitted_again(rail, rail.cell, found, DENSE, SETTINGS)
     turned = [np.abs(np.sin(one.lines.theta)).mean() for one in (rail, again)]
     assert turned[1] < 0.5 * turned[0]
+    assert (again.lines.cover == rail.lines.cover).all() and (again.lines.pure == rail.lines.pure).all()

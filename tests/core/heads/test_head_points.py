@@ -42,15 +42,27 @@ def test_faces_that_tripods_on_either_side_see_are_no_ridge():
     assert not near[0].is_blunt
 
 
+def seen_by_beams(beam_m, length_m, count):
+    """Points, (n, 3), on a straight head of 68 mm, 13 cm above its bed: beams blend what they meet beside it."""
+    rng = np.random.RandomState(0)
+    x, y = rng.uniform(0, length_m, count), rng.uniform(-0.034, 0.034, count)
+    beside = (np.abs(y) + rng.uniform(-0.5, 0.5, (100, 1)) * beam_m > 0.034).mean(axis=0)
+    return np.column_stack([x, y, -0.13 * beside + rng.normal(0, 0.007, count)])
+
+
 @pytest.mark.parametrize(("beam_m", "blunt"), [(0.055, True), (0.01, False)])
 def test_a_line_that_winds_about_its_head_shows_whether_beams_blend_it(beam_m, blunt):
     """Along the whole line, either side is off the head as often, and heights fall to both; six points per metre."""
-    rng = np.random.RandomState(0)
-    x, y = rng.uniform(0, 100, 600), rng.uniform(-0.034, 0.034, 600)
-    beside = (np.abs(y) + rng.uniform(-0.5, 0.5, (100, 1)) * beam_m > 0.034).mean(axis=0)
-    z = -0.13 * beside + rng.normal(0, 0.007, 600)
-    seen = np.column_stack([x, y + 0.018 * np.sin(x / 4), z])
+    seen = seen_by_beams(beam_m, 100.0, 600)
+    seen[:, 1] += 0.018 * np.sin(seen[:, 0] / 4)
     (near,) = near_lines([np.array([[0.0, 0.0], [100.0, 0.0]])], seen, 0.068)
+    assert near.is_blunt == blunt
+
+
+@pytest.mark.parametrize(("beam_m", "blunt"), [(0.06, True), (0.01, False)])
+def test_two_points_per_metre_show_whether_beams_blend_a_head(beam_m, blunt):
+    """Sections of 8 m would have too few points on the rims."""
+    (near,) = near_lines([np.array([[0.0, 0.0], [200.0, 0.0]])], seen_by_beams(beam_m, 200.0, 400), 0.068)
     assert near.is_blunt == blunt
 
 
