@@ -17,7 +17,6 @@ from .cells import (
     are_long,
     are_paired,
     as_wanted,
-    fitted_again,
     own_lengths,
 )
 from .labels import Near, label, whole_heads
@@ -59,19 +58,17 @@ SINGLE_DEPTH = 0.4
 of the bed bends at the crest of a bank, which then seems to be high. Measured: 0.31 to 0.35 there, and 0.55 and more
 on rails beside which the ground is seen."""
 
-SHARP_WIDER_M = 0.008
+SHARP_WIDER_M = 0.011
 """Width beyond that of a head up to which a piece shows that the cloud is sharp. Measured over half of the rails of a
-cloud and more: up to 5 mm by scanners, and from 11 mm on in images that blur by 2 cm."""
+cloud and more: up to 5 mm by scanners on the ground, 10 mm by some wide beams from the air, and from 11 mm on
+in images that blur by 2 cm."""
 
 
 def on_bars(
     kept: Kept, thin: bool, found: Candidates, shown: Shown, settings: Settings, tolerances: Tolerances
 ) -> Standing:
     """Keep the cells of pieces that are as narrow as a head."""
-    cells = _completed(found, kept, settings, tolerances)
-    if not thin:  # all cells are needed where they are few
-        kept = fitted_again(kept, cells, found, tolerances, settings)
-    heads = whole_heads(shown.tops, cells, tolerances)
+    heads = whole_heads(shown.tops, _completed(found, kept, settings, tolerances), tolerances)
     chosen = label(shown.tops, heads, shown.cell, shown.height, tolerances)
     beside = Near.find(shown.xy[chosen], kept.lines)
     piece = pieces_of(len(kept.cell), kept.pairs)

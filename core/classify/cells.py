@@ -138,25 +138,9 @@ def on_lines(found: Candidates, reach_m: float, tolerances: Tolerances, settings
     """Keep the candidates that lie on lines; which have partners is not known yet."""
     lines = find_lines(found.at(found.marks), reach_m, tolerances.along_m, tolerances.beside_line_m)
     good = lines.good()
-    lines = _on_middles(lines.of(good), found, tolerances, settings)
-    return Kept(lines, found.marks[good], np.zeros(len(good), dtype=bool), links(lines))
-
-
-def fitted_again(kept: Kept, heads: np.ndarray, found: Candidates, tolerances: Tolerances, settings: Settings) -> Kept:
-    """Fit the lines of kept cells to those of heads, (k,) in order, alone: what was dropped led them aside.
-
-    What all cells showed of their cover and purity stays: with fewer cells, both would mean something else.
-    """
-    wanted, reach_m = np.searchsorted(heads, kept.cell), kept.lines.reach_m
-    lines = find_lines(found.at(heads), reach_m, tolerances.along_m, tolerances.beside_line_m, wanted).of(wanted)
-    lines = replace(lines, cover=kept.lines.cover, pure=kept.lines.pure)
-    return replace(kept, lines=_on_middles(lines, found, tolerances, settings))
-
-
-def _on_middles(lines: Lines, found: Candidates, tolerances: Tolerances, settings: Settings) -> Lines:
-    """Move axes to the middle of all narrow cells of their heads."""
     half_m = settings.head_width_m / 2 + NOISE_ACROSS_M
-    return centred(lines, found.at(found.cells), half_m, tolerances.along_m)
+    lines = centred(lines.of(good), found.at(found.cells), half_m, tolerances.along_m)
+    return Kept(lines, found.marks[good], np.zeros(len(good), dtype=bool), links(lines))
 
 
 def free_standing(found: Candidates, bed: Bed, reach_m: float, tolerances: Tolerances, settings: Settings) -> Kept:
