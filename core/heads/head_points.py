@@ -60,7 +60,7 @@ unbiased."""
 MAX_ABOVE_SIGMAS = 3.0
 """Height above the top, in standard deviations of the noise, beyond which a point is a weed."""
 
-SECTION_M = 8.25
+SECTION_M = WINDOWS[-1] * STATION_STEP_M
 """Length of the sections of a line in which it is measured how far heads fall to both sides, that of the longest
 window: over it, the distance of a line from its head hardly changes, and tripods see the faces on one side only.
 Sections are longer where they would have fewer than `MIN_ON_HEAD` points on the head."""

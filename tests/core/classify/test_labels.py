@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from rail_extract.core.classify.labels import Near
 from rail_extract.core.classify.lines import Lines
-from rail_extract.core.classify.settings import DENSE
 
 WIDTH = 0.072
 
@@ -33,7 +32,7 @@ def test_a_head_of_which_both_faces_are_seen_is_as_wide_as_one_of_which_all_is()
     rng = np.random.RandomState(1)
     even = width_of(line(), rng.uniform(-WIDTH / 2, WIDTH / 2, 3000), rng)
     assert even == pytest.approx(WIDTH, abs=0.004)
-    assert width_of(line(), faces(rng), rng) < WIDTH + DENSE.wider_m
+    assert width_of(line(), faces(rng), rng) < WIDTH + 0.016  # scatter makes it 48 mm wider
 
 
 def test_what_the_axis_is_off_does_not_widen_a_head():
