@@ -58,6 +58,11 @@ def links(lines: Lines, within_m: float | None = None) -> np.ndarray:
     return pairs[on]
 
 
+def _links_past_wheels(lines: Lines) -> np.ndarray:
+    """Pairs of cells that are on each other's axis, also past what a wheel hides, (m, 2) int."""
+    return links(lines, max(HIDDEN_M, lines.reach_m))
+
+
 def lower_than_beside(lines: Lines, depth_m: float) -> np.ndarray:
     """Return which cells have one near them that is higher by more than `depth_m`, (n,) bool: feet and fastenings."""
     lower = np.zeros(len(lines.axis), dtype=bool)
@@ -111,9 +116,10 @@ def long_enough(
     """
     if not len(lines.axis):
         return np.zeros(0, dtype=bool)
-    kept = _reaches(lines.axis, pieces_of(len(lines.axis), pairs), LEAST_SINGLE_M, open_ended) & keep_single
+    piece = pieces_of(len(lines.axis), _links_past_wheels(lines))
+    kept = _reaches(lines.axis, piece, LEAST_SINGLE_M, open_ended) & keep_single
     pair = np.flatnonzero(with_partner(pairs, paired))
-    piece = pieces_of(len(pair), links(lines.of(pair), max(HIDDEN_M, lines.reach_m)))
+    piece = pieces_of(len(pair), _links_past_wheels(lines.of(pair)))
     long = np.zeros(len(paired), dtype=bool)
     long[pair] = _reaches(lines.axis[pair], piece, least_m, open_ended[pair])
     return kept | long
