@@ -17,6 +17,7 @@ from .cells import (
     are_long,
     are_paired,
     as_wanted,
+    fitted_again,
     own_lengths,
 )
 from .labels import Near, label, whole_heads
@@ -68,7 +69,10 @@ def on_bars(
     kept: Kept, thin: bool, found: Candidates, shown: Shown, settings: Settings, tolerances: Tolerances
 ) -> Standing:
     """Keep the cells of pieces that are as narrow as a head."""
-    heads = whole_heads(shown.tops, _completed(found, kept, settings, tolerances), tolerances)
+    cells = _completed(found, kept, settings, tolerances)
+    if not thin:  # all cells are needed where they are few
+        kept = fitted_again(kept, cells, found, tolerances, settings)
+    heads = whole_heads(shown.tops, cells, tolerances)
     chosen = label(shown.tops, heads, shown.cell, shown.height, tolerances)
     beside = Near.find(shown.xy[chosen], kept.lines)
     piece = pieces_of(len(kept.cell), kept.pairs)

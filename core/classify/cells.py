@@ -10,7 +10,16 @@ from .bed import COARSE_M, Bed, Coarse
 from .labels import Near
 from .lines import SINGLE_COVER, Lines, Marks, centred, find_lines
 from .partner import are_within_gauge, have_partners, runs_inside
-from .pieces import links, long_enough, lower_than_beside, shares_of_length, stands_free
+from .pieces import (
+    LEAST_SINGLE_M,
+    lengths,
+    links,
+    long_enough,
+    lower_than_beside,
+    pieces_of,
+    shares_of_length,
+    stands_free,
+)
 from .ridges import LEVEL_M, steadied
 from .settings import MARGIN_M, Settings, Tolerances
 from .tops import (
@@ -138,9 +147,30 @@ def on_lines(found: Candidates, reach_m: float, tolerances: Tolerances, settings
     """Keep the candidates that lie on lines; which have partners is not known yet."""
     lines = find_lines(found.at(found.marks), reach_m, tolerances.along_m, tolerances.beside_line_m)
     good = lines.good()
-    half_m = settings.head_width_m / 2 + NOISE_ACROSS_M
-    lines = centred(lines.of(good), found.at(found.cells), half_m, tolerances.along_m)
+    lines = _on_middles(lines.of(good), found, tolerances, settings)
     return Kept(lines, found.marks[good], np.zeros(len(good), dtype=bool), links(lines))
+
+
+def fitted_again(kept: Kept, heads: np.ndarray, found: Candidates, tolerances: Tolerances, settings: Settings) -> Kept:
+    """Fit the lines of kept cells to those of heads, (k,) in order, alone: what was dropped led them aside.
+
+    Only those of long pieces are: a row of cells along the edge of a sleeper would look like a bar. What all cells
+    showed of their cover and purity stays: with fewer cells, both would mean something else.
+    """
+    piece = pieces_of(len(kept.cell), kept.pairs)
+    long = (lengths(kept.lines.axis, piece) >= LEAST_SINGLE_M)[piece]
+    wanted, reach_m = np.searchsorted(heads, kept.cell[long]), kept.lines.reach_m
+    again = find_lines(found.at(heads), reach_m, tolerances.along_m, tolerances.beside_line_m, wanted).of(wanted)
+    again = _on_middles(again, found, tolerances, settings)
+    axis, theta = kept.lines.axis.copy(), kept.lines.theta.copy()
+    axis[long], theta[long] = again.axis, again.theta
+    return replace(kept, lines=replace(kept.lines, axis=axis, theta=theta))
+
+
+def _on_middles(lines: Lines, found: Candidates, tolerances: Tolerances, settings: Settings) -> Lines:
+    """Move axes to the middle of all narrow cells of their heads."""
+    half_m = settings.head_width_m / 2 + NOISE_ACROSS_M
+    return centred(lines, found.at(found.cells), half_m, tolerances.along_m)
 
 
 def free_standing(found: Candidates, bed: Bed, reach_m: float, tolerances: Tolerances, settings: Settings) -> Kept:
