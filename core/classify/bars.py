@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from .alone import are_solid, may_hide_partner, slopes_beside
+from .alone import UNDER_FOOT_M, are_solid, may_hide_partner, slopes_beside
 from .cells import (
     Candidates,
     Kept,
@@ -147,7 +147,8 @@ def _are_rails(kept: Kept, beside: Near, shown: Shown, settings: Settings, toler
     high = height_m >= SINGLE_HEIGHT_M
     rails = kept.lines.height[partnered & (lengths(kept.lines.axis, piece) >= LEAST_SINGLE_M)[piece]]
     if len(rails):
-        high |= np.abs(height_m - np.median(rails)) < AS_HIGH_M
+        off_m = np.abs(height_m - np.median(rails))
+        high = np.where(height_m > UNDER_FOOT_M, off_m < tolerances.partner_m, high | (off_m < AS_HIGH_M))
     slope = np.hypot(*shown.bed.gradients(kept.lines.axis).T)
     alone = narrow & high & (mean_of(slope, piece) <= SINGLE_SLOPE)
     alone &= slopes_beside(kept.lines, piece, kept.cell, shown.tops) <= SINGLE_FALL

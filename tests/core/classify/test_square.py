@@ -156,6 +156,14 @@ def test_a_lone_rail_stands_as_high_as_the_other_rails(height_m, kept):
     assert (found & ~bar).any()
 
 
+@pytest.mark.parametrize(("height_m", "kept"), [(0.23, True), (0.30, False)])
+def test_a_bar_that_is_higher_than_rails_on_their_bed_stands_as_high_as_the_other_rails(height_m, kept):
+    rng = np.random.RandomState(17)
+    xyz, _ = with_track(flat(16.0, rng=rng, per_m2=1200), GAUGE, WIDTH, 0.0)
+    xyz, bar = with_bar(xyz, WIDTH, 0.0, 5.0, height_m)
+    assert classify_square(rough(xyz, rng, 0.005), SETTINGS).rail[bar].any() == kept
+
+
 @pytest.mark.parametrize(("wide_m", "kept"), [(WIDTH, True), (0.14, False)])
 def test_a_bar_is_a_rail_only_with_a_partner_that_is_one(wide_m, kept):
     """Both are lower than a rail without a partner may be, as the ends of sleepers and what lies between tracks are."""
