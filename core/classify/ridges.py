@@ -13,7 +13,7 @@ from scipy.sparse import csr_matrix
 from scipy.spatial import cKDTree
 
 from .lines import Lines
-from .pieces import lengths, links
+from .pieces import lengths, links, pieces_of, to_one_side
 from .tops import MILLIMETRES, Grid
 
 REACH_M = 0.30
@@ -112,15 +112,17 @@ def on_crests(xy: np.ndarray, height: np.ndarray, lines: Lines, blur_m: float) -
     """
     if not len(lines.axis):
         return lines
-    count, rise = _profiles(xy, height, lines, np.arange(len(lines.axis)))
-    same = _along(lines)
+    pairs, own = links(lines, ALONG_M), np.arange(len(lines.axis))
+    across = to_one_side(lines, pieces_of(len(own), pairs))
+    count, rise = _profiles(xy, height, lines, across, own)
+    same = _along(own, pairs)
     count, rise = same @ count, same @ rise
     fits = np.array([_explained(count, rise, crest_m, blur_m) for crest_m in CRESTS_M])
     best = np.clip(np.argmax(fits, axis=0), 1, len(CRESTS_M) - 2)
     before, at, after = (fits[best + step, np.arange(len(best))] for step in (-1, 0, 1))
     part = np.clip(0.5 * (after - before) / np.maximum(2 * at - before - after, 1e-12), -0.5, 0.5)
     offset_m = CRESTS_M[best] + part * (CRESTS_M[1] - CRESTS_M[0])
-    return replace(lines, axis=lines.axis + offset_m[:, None] * lines.across)
+    return replace(lines, axis=lines.axis + offset_m[:, None] * across)
 
 
 def steadied(lines: Lines) -> Lines:
@@ -159,30 +161,34 @@ def _explained(count: np.ndarray, rise: np.ndarray, crest_m: float, blur_m: floa
     return np.einsum("ki,ki->k", right, np.linalg.solve(normal, right[:, :, None])[:, :, 0])
 
 
-def _along(lines: Lines) -> csr_matrix:
-    """Which cells belong to the same rail as each cell, within `ALONG_M`, (cells, cells)."""
-    one, other = links(lines, ALONG_M).T
-    own = np.arange(len(lines.axis))
+def _along(own: np.ndarray, pairs: np.ndarray) -> csr_matrix:
+    """Which cells, of the numbers `own`, (n,), are a pair with each cell, (m, 2), and the cell itself, (n, n)."""
+    one, other = pairs.T
     rows, columns = np.concatenate([own, one, other]), np.concatenate([own, other, one])
     return csr_matrix((np.ones(len(rows)), (rows, columns)), shape=(len(own), len(own)))
 
 
 def _sections(xy: np.ndarray, height: np.ndarray, lines: Lines, piece: np.ndarray) -> np.ndarray:
     """Mean heights of the points beside each piece relative to its line, (pieces, BINS); NaN in bins without points."""
-    count, rise = _profiles(xy, height, lines, piece)
+    count, rise = _profiles(xy, height, lines, to_one_side(lines, piece), piece)
     with np.errstate(invalid="ignore"):
         return rise / count
 
 
-def _profiles(xy: np.ndarray, height: np.ndarray, lines: Lines, piece: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Count the points beside each piece, and sum up their heights relative to its line, (pieces, BINS) each."""
+def _profiles(
+    xy: np.ndarray, height: np.ndarray, lines: Lines, across: np.ndarray, piece: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Count the points beside each piece, and sum up their heights relative to its line, (pieces, BINS) each.
+
+    Bins are in the direction of the unit vectors `across`, (cells, 2), which are to the same side of what is summed up.
+    """
     count, reach_m = int(piece.max()) + 1, float(np.hypot(REACH_M, SLICE_M))
     near = _around(xy, lines.axis, reach_m)
     distance, cell = cKDTree(lines.axis).query(xy[near], distance_upper_bound=reach_m)
     seen = np.isfinite(distance)
     near, cell = near[seen], cell[seen]
     step = xy[near] - lines.axis[cell]
-    bins = np.floor(np.einsum("ij,ij->i", step, lines.across[cell]) / BIN_M).astype(np.int64) + BINS // 2
+    bins = np.floor(np.einsum("ij,ij->i", step, across[cell]) / BIN_M).astype(np.int64) + BINS // 2
     inside = np.abs(np.einsum("ij,ij->i", step, lines.along[cell])) < SLICE_M
     inside &= (bins >= 0) & (bins < BINS)
     number = (piece[cell] * BINS + bins)[inside]

@@ -1,9 +1,11 @@
 """How wide the ridges of a blunt cloud are, and which of them may be heads."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from rail_extract.core.classify.lines import Lines
-from rail_extract.core.classify.ridges import steadied
+from rail_extract.core.classify.ridges import on_crests, steadied
 from rail_extract.core.classify.settings import Settings, Way
 from rail_extract.core.classify.square import classify_square
 from scipy.special import ndtr
@@ -68,6 +70,16 @@ def lines_beside(across_m):
     along_m = 0.04 * np.arange(len(across_m))
     same = np.zeros(len(along_m))
     return Lines(np.column_stack([along_m, across_m]), same + 0.15, same, same + 1.0, same + 1.0, 1.0)
+
+
+def test_crests_are_found_where_lines_point_either_way():
+    """Lines have no direction: along the x axis, half of them seem to point back."""
+    rng = np.random.RandomState(6)
+    lines = lines_beside(np.zeros(100))
+    lines = replace(lines, theta=np.where(np.arange(100) % 2, 0.002, np.pi - 0.002))
+    xy = np.column_stack([rng.uniform(0.0, 4.0, 20_000), rng.uniform(-0.3, 0.3, 20_000)])
+    height = 0.15 * np.exp(-0.5 * ((xy[:, 1] - 0.02) / 0.042) ** 2)
+    assert on_crests(xy, height, lines, 0.042).axis[:, 1] == pytest.approx(0.02, abs=0.002)
 
 
 def test_axes_that_scatter_are_steadied():
