@@ -159,17 +159,17 @@ def _of_head(points: HeadPoints, unseen_m: float, by_outline: bool) -> Shown:
     if by_outline:
         outline = outline_middles(points, shown & one_head)
     outlined = np.isfinite(outline.offset)
-    wanted = ~outlined & ~seen & free.all(axis=0)
+    wanted = ~outlined & free.all(axis=0)
     beside = beside_faces(points, wanted)
-    which = [outlined, seen, wanted & np.isfinite(beside.offset), on_head > 0]
+    which = [outlined, wanted & np.isfinite(beside.offset), seen, on_head > 0]
     unsure_m = np.hypot(unseen_m, either_end_m)
     by_mean = np.full(len(stations), STATION_STEP_M / unseen_m**2)
     return Shown(
         stations,
         top.per_station(),
-        np.select(which, [outline.offset, edge_m, beside.offset, mean_m]),
-        np.select(which, [outline.information, edge_information, beside.information, by_mean]),
-        np.select(which, [outline.common, EDGE_SIGMA_M, beside.common, unsure_m]),
+        np.select(which, [outline.offset, beside.offset, edge_m, mean_m]),
+        np.select(which, [outline.information, beside.information, edge_information, by_mean]),
+        np.select(which, [outline.common, beside.common, EDGE_SIGMA_M, unsure_m]),
         outline,
     )
 

@@ -1,7 +1,8 @@
 """Heads of which a scanner shows one side: where their axis is beside the band of points.
 
-A far scanner, or one beside a polished crown, sees one face and a little of the crown, half a head off the axis. Few
-points or many, offset and height together show which side of the head they are on. See docs/method.md section 6.7.
+A far scanner, or one beside a polished crown, sees one face or its corner and a little of the crown, half a head off
+the axis. Few points or many, offset and height together show which side of the head they are on. See docs/method.md
+section 6.7.
 """
 
 from __future__ import annotations
@@ -10,11 +11,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import median_filter
+from scipy.ndimage import median_filter, percentile_filter
 
+from ..lines.smoothing import smooth_profile
 from .head_points import MIN_ON_HEAD, HeadPoints
 from .level import MIN_NOISE_M, rough_level
-from .outline import FACE_DEPTH_M, FACES, Grid, Outline, fit_section, log_likelihood
+from .outline import CORNER_RADIUS_M, FACE_DEPTH_M, Grid, Outline, fit_section, log_likelihood
 from .sections import MIN_SECTION_POINTS, borders
 
 MAX_BAND_SHARE, BAND_PERCENTILES = 0.4, (5.0, 95.0)
@@ -44,15 +46,23 @@ LEAST_POINTS, SECTION_POINTS = 30, 60
 """Points from which a head is looked for, and points of a section. On far rails of random worlds, the logarithms of the
 likelihoods of the two sides differ by 4 to 27 with 30 points, by 5 to 100 with 60."""
 
-DEPTH_M = 0.06
-"""Distance in height from most points within which those of a head are: its faces are 40 mm high."""
+WEB_DEPTH_M, ABOVE_M = 0.045, 0.03
+"""Depth below the highest points of a line from which points are on the web below the head, whose faces end 40 mm below
+the top; and height above them from which points are of weeds."""
+
+PROFILE_M = 5.0
+"""Sigma of PAEK for the mean height along a line, above which the highest points around each are found."""
+
+HIGHEST_PERCENT = 90.0
+"""Percentile of the heights of successive points that is the highest of a head: a tenth may be weeds."""
 
 BAND_POINTS = 41
 """Successive points whose median is the band of a line. A line that was drawn from few points wanders about it by 3 cm
 in 20 m, so that a section about the line would be smeared."""
 
-MIN_FACE_SHARE = 0.2
-"""Least share of the points that are on a face: those of road beside a head, which is as high, are on none."""
+MIN_SIDE_SHARE = 0.5
+"""Least share of the points that are on one side of a head, from its upper corner on down: a class of heads may leave
+out what is below this corner. Road beside a head, which is as high, is wider than a corner."""
 
 MAX_STRAY_SHARE, MAX_NOISE_M = 0.4, 0.008
 """Largest share of points on no part of a head, and largest noise: what spreads further is ballast, or no rail."""
@@ -92,7 +102,7 @@ class _Fit:
     """The outline of a head, fitted to points: its axis to the left of their middle, its top above it, metres.
 
     `side` is 1 where the axis is on the left of the points, -1 on their right, and 0 where they are about it. `stray`
-    and `face` are the shares of points on no part of the head, and on its faces.
+    and `beside` are the shares of points on no part of the head, and on that side of it.
     """
 
     likelihood: float
@@ -100,13 +110,13 @@ class _Fit:
     top_m: float
     side: int
     stray: float
-    face: float
+    beside: float
     noise_m: float
 
     @property
-    def shows_face(self) -> bool:
-        """Whether these are the points of a head of which a face is seen."""
-        return self.stray <= MAX_STRAY_SHARE and self.face >= MIN_FACE_SHARE and self.noise_m <= MAX_NOISE_M
+    def shows_side(self) -> bool:
+        """Whether these are the points of a head of which one side is seen."""
+        return self.stray <= MAX_STRAY_SHARE and self.beside >= MIN_SIDE_SHARE and self.noise_m <= MAX_NOISE_M
 
 
 def find_flank(points: HeadPoints) -> Flank | None:
@@ -137,9 +147,9 @@ def beside_faces(points: HeadPoints, wanted: np.ndarray) -> Beside:
     on one side: sections whose points may be on either face follow those that show which one they are on.
     """
     found = Beside(*np.full((3, len(wanted)), np.nan))
-    points, up = _as_high(points)
     if len(points.t) < LEAST_POINTS:
         return found
+    points, up = _as_high(points)
     off_band = points.across - band_of(points)
     parts, own = [], []
     for first, last in borders(points.station, len(wanted), SECTION_POINTS):
@@ -151,7 +161,7 @@ def beside_faces(points: HeadPoints, wanted: np.ndarray) -> Beside:
     usual = _side_of(fits)
     for part, mine, tried in zip(parts, own, fits):
         likely = _likely(tried, usual)
-        if not likely[0].shows_face:
+        if not likely[0].shows_side:
             continue
         left_m, found.common[part] = _axis(likely, points.width_m)
         on_head = np.abs(off_band[mine] - left_m) < 0.5 * points.width_m + NEAR_HEAD_M
@@ -177,12 +187,14 @@ def _by_station(points: HeadPoints, part: slice, off_band: np.ndarray) -> tuple[
 
 
 def _as_high(points: HeadPoints) -> tuple[HeadPoints, np.ndarray]:
-    """Return the points of a line that are about as high as most around them, and by how much they are higher, (n,)."""
-    if not len(points.t):
-        return points, points.z
-    up = points.z - rough_level(points.t, points.z)
-    near = np.abs(up) < DEPTH_M
-    return points[near], up[near]
+    """Return the points of a line that are as high as its head, and by how much they are above most of these, (n,).
+
+    A class of whole rails shows the web as well: it is 3 cm beside the face that the scanner sees, below the axis.
+    """
+    up = points.z - smooth_profile(points.t, points.z, PROFILE_M, points.t)
+    up -= percentile_filter(up, HIGHEST_PERCENT, min(BAND_POINTS, len(up)), mode="nearest")
+    head = (up > -WEB_DEPTH_M) & (up < ABOVE_M)
+    return points[head], up[head] - np.median(up[head])
 
 
 def _fits(across: np.ndarray, up: np.ndarray, head_width_m: float) -> list[_Fit]:
@@ -200,7 +212,8 @@ def _fits(across: np.ndarray, up: np.ndarray, head_width_m: float) -> list[_Fit]
         likelihood = log_likelihood(counts, section, outline, grid) + outside * np.log(stray / grid.size)
         axis_m = left_m + float(section.place[0])
         side = int(np.sign(axis_m)) if abs(axis_m) > OFF_AXIS * head_width_m else 0
-        shares = (outside + stray * counts.sum()) / len(up), float(section.shares[FACES].sum())
+        beside = np.mean(-side * (across - axis_m) >= half_m - CORNER_RADIUS_M) if side else 0.0
+        shares = (outside + stray * counts.sum()) / len(up), float(beside)
         noise_m = float(np.exp(section.place[4:6].max()))
         fits.append(_Fit(likelihood, axis_m, top_m + float(section.place[1]), side, *shares, noise_m))
     return sorted(fits, key=lambda fit: -fit.likelihood)

@@ -76,6 +76,39 @@ def test_a_section_that_may_be_on_either_face_follows_the_rest_of_its_line():
     assert abs(np.nanmedian(beside.offset[:150])) < 0.006
 
 
+def corner_seen_from_right(count, length_m, seed):
+    """Points of a head of whose right side a class of heads keeps the upper corner alone, and a little of the crown."""
+    rng = np.random.default_rng(seed)
+    turn = rng.uniform(0.35, np.pi / 4, count)
+    off, below = 0.023 + 0.013 * np.sin(turn), 0.014 - 0.013 * np.cos(turn)
+    on_crown = rng.random(count) < 0.15
+    off[on_crown], below[on_crown] = rng.uniform(0.0, 0.023, on_crown.sum()), 0.0
+    t, noise = rng.uniform(0, length_m, count), rng.normal(0, NOISE_M, (2, count))
+    return t, noise[0] - off, noise[1] - below
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_class_without_faces_shows_by_the_corner_on_which_side_the_axis_is(seed):
+    """In world 10176, one half of a far rail was on its axis and the other not, and a line through both 6 cm off."""
+    t, across, up = corner_seen_from_right(150, 80.0, seed)
+    points = along(t, across + 0.036, up, 80.0)  # the line is on the edge
+    axis = Axis.of(points, UNSEEN, by_outline=False)
+    off_m = axis.course.at(np.arange(2.0, 78.0)) - 0.036
+    assert np.sqrt(np.mean(off_m**2)) < 0.010
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_web_below_a_far_head_is_not_taken_for_the_rest_of_it(seed):
+    """In world 10169, most of the points of a far rail were on its web, 3 cm beside the face, and the line too."""
+    rng = np.random.default_rng(seed)
+    t, across, up = seen_from_right(200, 60.0, seed)
+    web = rng.normal(0, NOISE_M, (2, 200)) + np.array([np.full(200, -0.008), -rng.uniform(0.05, 0.11, 200)])
+    points = along(np.append(t, rng.uniform(0, 60, 200)), np.append(across, web[0]) + 0.02, np.append(up, web[1]), 60.0)
+    axis = Axis.of(points, UNSEEN, by_outline=False)
+    off_m = axis.course.at(np.arange(2.0, 58.0)) - 0.02
+    assert np.sqrt(np.mean(off_m**2)) < 0.010
+
+
 def test_scattered_points_show_no_head():
     """In world 8109, 50 points of ballast along a rail that nobody sees were taken for one."""
     rng = np.random.default_rng(0)
