@@ -70,6 +70,10 @@ VEHICLE_NEAR_M = 3.0
 VEHICLE_WEIGHT = 0.25
 """Weight of a level that is rather that of a vehicle: it counts if the lower one is very short."""
 
+FOOT_M, FOOT_SHARE = 0.20, 0.9
+"""Height of the tallest rails with their pad, up to which a level above another one may be the head above its foot; and
+share of the bins of the foot in which the head is seen, too. No part of a vehicle is this low along all of a rail."""
+
 ABOVE_M, BELOW_M = 0.03, 0.06
 """Heights above and below its level up to which points are on a head: weeds are higher, and faces with their noise are
 not lower."""
@@ -207,13 +211,24 @@ def _apart(earlier: np.ndarray, later: np.ndarray) -> float:
 
 
 def _weight(piece: np.ndarray, pieces: Sequence[np.ndarray]) -> float:
-    """Return how much a level counts, in bins: less if it is a vehicle's, which shows where another is far below it."""
+    """Return how much a level counts, in bins: less if it is a vehicle's, which shows where another is far below it.
+
+    The foot of a rail is as far below its head, all along it, and counts less as well.
+    """
     near = VEHICLE_NEAR_M / LEVEL_BIN_M
     for other in pieces:
-        is_near = other[0, 0] <= piece[-1, 0] + near and other[-1, 0] >= piece[0, 0] - near
-        if is_near and np.median(_near(other, piece, near)) < np.median(_near(piece, other, near)) - VEHICLE_M:
+        if other[0, 0] > piece[-1, 0] + near or other[-1, 0] < piece[0, 0] - near:
+            continue
+        above_m = float(np.median(_near(piece, other, near)) - np.median(_near(other, piece, near)))
+        is_vehicle = above_m > VEHICLE_M and not _is_foot(other, piece, above_m)
+        if is_vehicle or (above_m < -VEHICLE_M and _is_foot(piece, other, -above_m)):
             return VEHICLE_WEIGHT * len(piece)
     return float(len(piece))
+
+
+def _is_foot(lower: np.ndarray, upper: np.ndarray, apart_m: float) -> bool:
+    """Return whether a level may be that of the foot of a rail below another one, that of its head."""
+    return apart_m <= FOOT_M and bool(np.isin(lower[:, 0], upper[:, 0]).mean() >= FOOT_SHARE)
 
 
 def _near(piece: np.ndarray, other: np.ndarray, near: float) -> np.ndarray:

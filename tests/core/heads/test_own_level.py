@@ -47,6 +47,16 @@ def test_a_train_that_stands_on_the_rail_is_not_even_where_it_hides_most_of_it()
     assert train.mean() < 0.01
 
 
+@pytest.mark.parametrize("foot_density", [100, 200])
+def test_a_head_is_no_vehicle_on_its_foot(foot_density):
+    """In world 10161, a line between the head of a whole rail and the side of its foot followed the foot."""
+    head = band(0, 100, across=-0.032, profile=hilly)
+    foot = band(0, 100, foot_density, -0.165, across=0.02, half=0.03, seed=1, profile=hilly)
+    on_head, on_foot = own(head, foot)
+    assert on_head.mean() > 0.98
+    assert on_foot.mean() < 0.01
+
+
 @pytest.mark.parametrize("wave_m", [0.04, 0.06])
 def test_a_rail_whose_level_drifts_is_not_a_vehicle_where_noise_breaks_it_into_pieces(wave_m):
     (rail,) = own(band(0, 100, 70, noise=0.015, profile=lambda t: wave_m * np.sin(2 * np.pi * t / 140)))
