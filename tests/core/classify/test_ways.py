@@ -62,7 +62,7 @@ def test_all_parts_are_searched_in_one_way(parts, way):
     assert ways(*parts) == [way] * len(parts)
 
 
-@pytest.mark.parametrize(("again", "way"), [(0.9, Way.BLUNT), (0.1, Way.SHARP)])
+@pytest.mark.parametrize(("again", "way"), [(0.9, Way.BLUNT), (0.6, Way.SHARP), (0.1, Way.SHARP)])
 def test_a_cloud_whose_round_rails_are_no_ridges_of_a_surface_is_sharp(again, way):
     """A thin, wide beam rounds heads as images do, but its points are not a smooth surface."""
     assert ways(*[(6.0, 60.0)] * 9, again=again) == [way] * 9
