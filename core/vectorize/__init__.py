@@ -13,10 +13,8 @@ from ..parameters import Parameters
 from ..progress import SILENT, Progress
 from ..raster import RailRaster
 from .branches import attach_branches, choose_routes, part_branches
-from .crossings import resolve_crossings
-from .detours import straighten
-from .joining import join_gaps
-from .junctions import clean_junctions, cut_kinks, run_through, weld_pairs
+from .courses import follow_courses
+from .junctions import clean_junctions, cut_bends, run_through, weld_pairs
 from .skeleton import chamfer_distance, close, parity_fix, pixel_set, prune, trace, veinerize
 from .slips import add_curves, open_slips
 
@@ -58,11 +56,9 @@ def vectorize(
     progress.check()
     seen = cKDTree(closed.to_local(pixels.cells / 2))
     network, slips = open_slips(clean_junctions(traced, head_width_m), seen)
-    # Wing rails bend the legs of a crossing next to it; elsewhere, a kink may have cut off what is a leg.
-    network = cut_kinks(resolve_crossings(network), progress.span(0.6, 0.8))
-    network = resolve_crossings(straighten(network, seen, progress.span(0.8, 0.85)))
-    network = part_branches(add_curves(network, slips))
-    network = join_gaps(run_through(network), seen, max_gap_m, gap_angle_deg, progress)
+    network = cut_bends(network, progress.span(0.6, 0.7))
+    network = follow_courses(network, seen, max_gap_m, gap_angle_deg, progress.span(0.7, 0.9))
+    network = run_through(part_branches(add_curves(network, slips)))
     network = attach_branches(network, seen, max_gap_m, progress.span(0.9, 1.0))
     return _settle_ends(choose_routes(_drop_short(network, min_length_m)))
 

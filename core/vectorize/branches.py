@@ -26,9 +26,8 @@ from ..lines.ends import (
 from ..lines.network import LineNetwork
 from ..polyline import Polyline
 from ..progress import SILENT, Progress
-from .crossings import MISFIT_M as KNOWN_MISFIT_M
-from .crossings import SKIP_M
-from .joining import unseen_m
+from .courses import MISFIT_M as KNOWN_MISFIT_M
+from .courses import SKIP_M, unseen_m
 from .junctions import DEFLECTION_DEG, DIRECTION_M, deflections, ends_by_node, unsteadiness
 
 MAX_BACK_M = 40.0

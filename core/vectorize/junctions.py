@@ -9,9 +9,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.ndimage import median_filter
+from scipy.signal import find_peaks
 
 from ..lines.ends import STEP_M, even_points, tip_and_direction
-from ..lines.finishing import parts_without_turns
 from ..lines.network import LineNetwork
 from ..polyline import Polyline
 from ..progress import SILENT, Progress
@@ -36,9 +37,18 @@ DIRECTION_M = 2.5
 COARSE_M = 1.0
 """Spacing of the points that are compared: directions between closer ones show the stairs."""
 
-KINK_DEG, KINK_STEP_M = 25.0, 0.5
-"""No rail turns by this angle within a metre, measured between stations this far apart; the stairs of a raster turn by
-6 degrees."""
+BEND_M = 1.5
+"""Length of line before and behind a bend that shows its direction: shorter ones show the stairs of the raster."""
+
+BEND_DEG = 3.0
+"""A line that changes over to a check rail, 0.14 m aside, within 2.5 m bends by this much; stairs turn directions by a
+degree. Where a rail only seems to bend, both parts are joined again."""
+
+SHORTEST_BEND_M = 0.6
+"""Smallest distance of two bends, and shortest length that shows a direction."""
+
+STEADY_BEND_M = 10.1
+"""Length around a bend whose median is what the rail itself bends."""
 
 
 def clean_junctions(network: LineNetwork, head_width_m: float) -> LineNetwork:
@@ -162,18 +172,34 @@ def unsteadiness(one: np.ndarray, other: np.ndarray, length_m: float) -> float:
     return float(np.sqrt(np.mean((aside - np.polyval(np.polyfit(along, aside, 2), along)) ** 2)))
 
 
-def cut_kinks(network: LineNetwork, progress: Progress = SILENT) -> LineNetwork:
-    """Cut lines, without passes, where they turn too sharply for a rail, and drop the bent part; new ends are free."""
+def cut_bends(network: LineNetwork, progress: Progress = SILENT) -> LineNetwork:
+    """Cut lines, without passes, where they bend unlike the line around; the parts meet in nodes.
+
+    There, a line may change over to another rail: a check rail or a wing rail that hides it, or one that it crosses.
+    """
     lines: list[np.ndarray] = []
-    ends: list[list[int]] = []
+    ends: list[tuple[int, int]] = []
     nodes = list(network.nodes)
-    for line, own in progress.follow(zip(network.lines, network.ends.tolist()), len(network.lines)):
-        for start, end in parts_without_turns(line, STEP_M, KINK_STEP_M, KINK_DEG):
-            piece = line if end - start >= Polyline(line).length_m else Polyline(line).part(start, end).xyz
-            lines.append(piece)
-            ends.append([])
-            for node, was, now in zip(own, line[[0, -1]], piece[[0, -1]]):
-                ends[-1].append(node if (was == now).all() else len(nodes))
-                nodes += [] if (was == now).all() else [now]
-    whole = LineNetwork(tuple(lines), np.array(nodes).reshape(-1, 2), np.array(ends, dtype=int).reshape(-1, 2))
-    return weld_pairs(whole.tidy())
+    for line, (first, last) in progress.follow(zip(network.lines, network.ends.tolist()), len(network.lines)):
+        own, bends = Polyline(line), _bends(line)
+        numbers = [first, *range(len(nodes), len(nodes) + len(bends)), last]
+        nodes += list(own.at(np.array(bends)))
+        stops = [0.0, *bends, own.length_m]
+        lines += [own.part(*part).xyz for part in zip(stops, stops[1:])] if bends else [line]
+        ends += list(zip(numbers, numbers[1:]))
+    return LineNetwork(tuple(lines), np.array(nodes).reshape(-1, 2), np.array(ends, dtype=int).reshape(-1, 2))
+
+
+def _bends(line: np.ndarray) -> list[float]:
+    """Find the chainages at which a line bends more than `BEND_DEG` apart from what it bends around them."""
+    points = even_points(line)
+    width = min(int(BEND_M / STEP_M), (len(points) - 5) // 2)
+    if width < SHORTEST_BEND_M / STEP_M:
+        return []
+    x = np.arange(width) - (width - 1) / 2
+    ahead = [np.convolve(ordinates, x[::-1] / (x @ x), "valid") for ordinates in points.T]
+    direction = np.degrees(np.unwrap(np.arctan2(ahead[1], ahead[0])))
+    bend = direction[width:] - direction[:-width]
+    odd = np.abs(bend - median_filter(bend, int(STEADY_BEND_M / STEP_M), mode="nearest"))
+    peaks = find_peaks(odd, height=BEND_DEG, distance=int(SHORTEST_BEND_M / STEP_M))[0]
+    return (Polyline(line).length_m * (peaks + width - 0.5) / (len(points) - 1)).tolist()
