@@ -5,11 +5,13 @@ See docs/method.md section 4.8.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from ..lines.ends import (
@@ -48,7 +50,7 @@ LINK_M = 3.0
 """A shorter piece between two junctions or bends may be none of any rail: a rung, a swerve, or the mouth of a wing
 rail. A spur up to this length that no rail continues is a wing rail."""
 
-UNSEEN_M = 0.10
+UNSEEN_M = 0.12
 """A place this far from all cells shows neither its rail nor one that is merged with it."""
 
 STEADY_M = 8.0
@@ -67,6 +69,9 @@ FREE = 4.0
 """Cost of an end that is not continued, in squares of standard errors: a join of two ends costs less up to √8 of them,
 34 mm off one curve."""
 
+HALF_USED = 1000.0
+"""The same for an end of a link whose other end is continued: too much for any link."""
+
 JOIN, CUT_PER_M, UNSEEN = 0.5, 0.3, 2.0
 """Further costs of a join: of having one, so that two rails are not drawn with three; of each metre that is cut off;
 and of a part without cells that is as long as the longest gap."""
@@ -75,7 +80,7 @@ BESIDE_M = 0.2
 BESIDE_SHARE = 0.7
 """A link is left out of the drawing if more of it than this is within `UNSEEN_M` of the joins that replace it."""
 
-LINK_PER_M = 0.8
+LINK_PER_M, PIECE_PER_M = 0.5, 1.0
 """Cost of each metre of a link that is left out: the shared part of two rails that cross at 1:9 costs about as much as
 a join."""
 
@@ -140,14 +145,16 @@ class _Joins:
         found: tuple[float, Bridge] | None = None
         shortest_m = min(self.lengths[one // 2], self.lengths[other // 2])
         for cut_m in CUTS_M:
-            if cut_m > 0 and shortest_m < cut_m + 2 * SKIP_M:
+            if shortest_m < cut_m + 2 * SKIP_M and cut_m > 0:
                 break
             ways = [cut_back(self.network.from_end(end), cut_m) for end in (one, other)]
             # A curve that replaces bent ends must not swerve to a rail beside them.
             transition_m = TRANSITION_M if cut_m <= SKIP_M else STEADY_TRANSITION_M
             curve = bridge(*ways, misfit_m=MISFIT_M, transition_m=transition_m)
-            cost = np.inf if curve is None else JOIN + CUT_PER_M * cut_m + self._cost(ways[0], ways[1], curve)
-            if curve is not None and cost < (found[0] if found else 2 * FREE):
+            if curve is None:
+                continue
+            cost = JOIN + CUT_PER_M * cut_m + self._cost(ways[0], ways[1], curve)
+            if cost < (found[0] if found else 2 * FREE):
                 found = cost, replace(curve, cuts_m=(curve.cuts_m[0] + cut_m, curve.cuts_m[1] + cut_m))
         return found
 
@@ -178,57 +185,94 @@ class _Joins:
 
     def chosen(self) -> list[tuple[int, int]]:
         """List the joins that together cost least."""
-        gains = {ends: 2 * FREE - cost for ends, cost in self.costs.items()}
+        free = np.where(self.is_link, HALF_USED, FREE)
+        gains = {ends: free[ends[0] // 2] + free[ends[1] // 2] - cost for ends, cost in self.costs.items()}
         for number in np.flatnonzero(self.lengths < MAX_MERGED_M).tolist():
-            gains[2 * number, 2 * number + 1] = 2 * FREE - LINK_PER_M * self.lengths[number]
+            per_m = LINK_PER_M if self.is_link[number] else PIECE_PER_M
+            gains[2 * number, 2 * number + 1] = 2 * free[number] - per_m * self.lengths[number]
         return sorted(ends for ends in best_pairs(gains) if ends in self.costs)
 
 
 def _joined(network: LineNetwork, joins: _Joins) -> tuple[LineNetwork, bool]:
     """Draw the joins that cost least, without the links that they replace; also returns whether there are any."""
-    degrees, nodes, at_node = network.degrees(), network.ends.ravel(), dict(ends_by_node(network))
+    nodes, at_node = network.ends.ravel(), dict(ends_by_node(network))
     chosen = joins.chosen()
     taken = {end for ends in chosen for end in ends}
-    bridges = {}
-    for one, other in chosen:
-        node = nodes[one]
-        is_branching = node == nodes[other] and degrees[node] == 3 and len(taken.intersection(at_node[node])) == 2
-        if not is_branching:
-            bridges[one, other] = joins.bridges[one, other]
+    unused = [number for number in np.flatnonzero(joins.is_link).tolist() if not taken & {2 * number, 2 * number + 1}]
+    bridges = {ends: joins.bridges[ends] for ends in chosen if not _is_branching(network, ends, taken, unused)}
     if not bridges:
         return network, False
+    cuts_m = {end: cut_m for ends, curve in bridges.items() for end, cut_m in zip(ends, curve.cuts_m)}
+    for ends in sorted(bridges, key=lambda ends: -joins.costs[ends]):
+        # What two joins cut off one piece, more than there is, is decided once the cheaper one is drawn.
+        if any(cuts_m[end] + cuts_m.get(end ^ 1, 0.0) > joins.lengths[end // 2] for end in ends):
+            del bridges[ends], cuts_m[ends[0]], cuts_m[ends[1]]
     joined = {end for ends in bridges for end in ends}
     drawn = cKDTree(np.concatenate([np.empty((0, 2)), *(curve.points for curve in bridges.values())]))
     dropped = []
-    for number in np.flatnonzero(joins.is_link).tolist():
+    for number in unused:
         own = {2 * number, 2 * number + 1}
         is_loose = any(joined.issuperset(set(at_node[nodes[end]]) - own) for end in own)
-        is_short = joins.lengths[number] < LINK_M
-        if not own & taken and (is_loose and is_short or _is_beside(network.lines[number], drawn)):
+        if is_loose and joins.lengths[number] < LINK_M or _is_beside(network.lines[number], drawn):
             dropped.append(number)
     return weld_pairs(network.bridged(bridges, {}, dropped)), True
+
+
+def _is_branching(network: LineNetwork, ends: tuple[int, int], taken: Collection[int], unused: Collection[int]) -> bool:
+    """Return whether a join passes nodes, connected by `unused` links, at which it leaves ends over on one side."""
+    nodes, links = network.ends.ravel(), network.ends[list(unused)].T
+    graph = coo_matrix((np.ones(len(unused)), tuple(links)), shape=(len(network.nodes),) * 2)
+    place = connected_components(graph, directed=False)[1][nodes]
+    if place[ends[0]] != place[ends[1]]:
+        return False
+    here = set(np.flatnonzero(place == place[ends[0]]).tolist()) - {2 * n + side for n in unused for side in (0, 1)}
+    left = here - set(taken)
+    ways = np.array([_tip(network.from_end(end))[1] for end in sorted(left)]).reshape(-1, 2)
+    same = ways @ _tip(network.from_end(ends[0]))[1] > 0
+    return bool(left) and here - left == set(ends) and bool(same.all() or not same.any())
 
 
 def best_pairs(gains: Mapping[tuple[int, int], float]) -> set[tuple[int, int]]:
     """Choose pairs, each number in one of them at most, whose gains have the largest sum.
 
-    This is an assignment of numbers to numbers in which most are each other's. Of longer rings, every other pair is
-    taken, the best ones first, which may miss the largest sum by a little.
+    The assignment of numbers to numbers with the largest gain pairs most of them. Where it forms a ring of three or
+    more instead, the best pairs with and without its best pair are compared.
     """
+    chosen: set[tuple[int, int]] = set()
+    for part in _parts({pair: gain for pair, gain in gains.items() if gain > 0}):
+        chosen |= _best_of_part(part)
+    return chosen
+
+
+def _best_of_part(gains: dict[tuple[int, int], float]) -> set[tuple[int, int]]:
     numbers = sorted({number for pair in gains for number in pair})
-    place = {number: row for row, number in enumerate(numbers)}
-    gain = np.full((len(numbers), len(numbers)), -1e9)
-    np.fill_diagonal(gain, 0.0)
-    for (one, other), value in gains.items():
-        gain[place[one], place[other]] = gain[place[other], place[one]] = value
-    rows, columns = linear_sum_assignment(gain, maximize=True)
-    pairs: set[tuple[int, int]] = set()
-    taken: set[int] = set()
-    for row, column in sorted(zip(rows.tolist(), columns.tolist()), key=lambda pair: (-gain[pair], pair)):
-        if row != column and gain[row, column] > 0 and not taken & {row, column}:
-            taken |= {row, column}
-            pairs.add((numbers[min(row, column)], numbers[max(row, column)]))
-    return pairs
+    gain = np.zeros((len(numbers), len(numbers)))
+    for pair, value in gains.items():
+        row, column = np.searchsorted(numbers, pair)
+        gain[row, column] = gain[column, row] = value
+    _, partner = linear_sum_assignment(gain, maximize=True)
+    rings = np.flatnonzero((partner[partner] != np.arange(len(numbers))) & (gain[np.arange(len(numbers)), partner] > 0))
+    if not len(rings):
+        return {pair for pair in gains if partner[numbers.index(pair[0])] == numbers.index(pair[1])}
+    best = max(rings.tolist(), key=lambda row: gain[row, partner[row]])
+    one, other = sorted((numbers[best], numbers[partner[best]]))
+    others = {pair: value for pair, value in gains.items() if not {one, other} & set(pair)}
+    options = best_pairs(others) | {(one, other)}, best_pairs({p: v for p, v in gains.items() if p != (one, other)})
+    return max(options, key=lambda pairs: sum(gains[pair] for pair in pairs))
+
+
+def _parts(gains: dict[tuple[int, int], float]) -> list[dict[tuple[int, int], float]]:
+    """Split pairs into groups that share no number."""
+    if not gains:
+        return []
+    numbers, pairs = np.unique(list(gains), return_inverse=True)
+    one, other = pairs.reshape(-1, 2).T
+    graph = coo_matrix((np.ones(len(one)), (one, other)), shape=(len(numbers),) * 2)
+    count, part = connected_components(graph, directed=False)
+    groups: list[dict[tuple[int, int], float]] = [{} for _ in range(count)]
+    for (pair, gain), number in zip(gains.items(), one.tolist()):
+        groups[part[number]][pair] = gain
+    return groups
 
 
 def unseen_m(points: np.ndarray, seen: cKDTree) -> float:
