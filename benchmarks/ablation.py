@@ -94,13 +94,12 @@ def _rule(name: str, value: Any, *also: tuple[str, str, Any]) -> Switch:
 
 SWITCHES = (
     _rule("vectorize.open_slips", lambda network, seen: (network, [])),
-    _rule("vectorize.cut_kinks", first),
-    _rule("vectorize.straighten", first),
+    _rule("vectorize.cut_bends", first),
+    _rule("vectorize.follow_courses", first),
+    _rule("vectorize.courses.CUTS_M", (0.0,)),
     _rule("vectorize.attach_branches", first),
     _rule("vectorize.part_branches", first),
     _rule("vectorize.choose_routes", first),
-    _rule("vectorize.resolve_crossings", first),
-    _rule("vectorize.joining.HOOKS_M", (0.0,)),
     _rule("vectorize._settle_ends", first),
     _rule("vectorize.slips._paired", lambda found: list(found)),
     _rule("lines.ends._astray", lambda *_: 0),

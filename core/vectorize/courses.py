@@ -40,18 +40,18 @@ CUTS_M = (0.0, SKIP_M, 1.0, 2.0, 3.0)
 """Lengths cut off both ends before they are joined. Weeds, guard rails and wing rails draw ends aside for up to 3 m,
 even until two ends overlap side by side."""
 
+WING_M = 3.0
+"""What no rail continues up to this length at a junction is a wing rail, a rung or a swerve, and is left out."""
+
 MISFIT_M = 0.015
-"""Misfit allowed to the lines that a rail continues, larger than that of ends in open track: wing rails widen lines."""
+"""Misfit allowed to the lines that a rail continues: wing rails widen them. The cost of a join contains the rest."""
 
 MIN_PIECE_M = 0.3
 """Shorter pieces have no direction and are not joined."""
 
-LINK_M = 3.0
-"""A shorter piece between two junctions or bends may be none of any rail: a rung, a swerve, or the mouth of a wing
-rail. A spur up to this length that no rail continues is a wing rail."""
-
 UNSEEN_M = 0.12
-"""A place this far from all cells shows neither its rail nor one that is merged with it."""
+"""A place this far from all cells shows neither its rail, nor one that is merged with it, nor a check rail that hides
+it, whose head begins 0.10 m from the axis of the rail."""
 
 STEADY_M = 8.0
 """Length of line on either side of a join that is to be of one curvature."""
@@ -60,29 +60,29 @@ STAIRS_LENGTH_M = 1.0
 """Shorter parts of a line show the direction of stairs."""
 
 STRAY_M = 0.012
-"""Standard error of a steady line: places of a rail are anywhere in cells of 0.04 m, which is 0.04 m / √12 rms."""
+"""Standard error of a steady line: a rail is anywhere in cells of 0.04 m, which is 0.04 m / √12 rms."""
 
 TURN_DEG = 4.0
 """Standard error of the directions of two ends against the way across: wing rails bend them by about as much."""
 
 FREE = 4.0
-"""Cost of an end that is not continued, in squares of standard errors: a join of two ends costs less up to √8 of them,
-34 mm off one curve."""
+"""Cost of an end that nothing continues, in squares of standard errors: two ends are joined up to √8 of them, 34 mm off
+one curve."""
 
 HALF_USED = 1000.0
-"""The same for an end of a link whose other end is continued: too much for any link."""
+"""Cost of a free end of a link that is used: more than all that speaks for using it."""
 
 JOIN, CUT_PER_M, UNSEEN = 0.5, 0.3, 2.0
-"""Further costs of a join: of having one, so that two rails are not drawn with three; of each metre that is cut off;
-and of a part without cells that is as long as the longest gap."""
-
-BESIDE_M = 0.2
-BESIDE_SHARE = 0.7
-"""A link is left out of the drawing if more of it than this is within `UNSEEN_M` of the joins that replace it."""
+"""What a join costs in any case, so that one is better than two; each metre that is cut off; and a part without cells
+that is as long as the longest gap."""
 
 LINK_PER_M, PIECE_PER_M = 0.5, 1.0
-"""Cost of each metre of a link that is left out: the shared part of two rails that cross at 1:9 costs about as much as
-a join."""
+"""Cost of each metre of a link, and of another piece, that no rail uses. The shared part of two rails that cross at 1:9
+costs as much as a join."""
+
+BESIDE_M, BESIDE_SHARE = 0.2, 0.7
+"""An unused link of which a larger share is this close to the joins that replace it is left out. A check rail is 0.14 m
+from the axis of its rail."""
 
 
 def follow_courses(
@@ -102,14 +102,14 @@ def follow_courses(
         progress.check()
         network, joined = _joined(network, _Joins(network, seen, max_gap_m, gap_angle_deg))
         if not joined:
-            return drop_spurs(weld_pairs(network), LINK_M)
+            return drop_spurs(weld_pairs(network), WING_M)
 
 
 class _Joins:
     """The possible joins of a network: the least cost and the bridge of each pair of ends, and which pieces are links.
 
-    A link is a short piece between two junctions or bends, or a longer one between two junctions that two rails may
-    share.
+    A link is a piece between two junctions or bends that may belong to no rail, or to two: what rails share where they
+    cross, a check rail that hides one, a rung between two.
     """
 
     def __init__(self, network: LineNetwork, seen: cKDTree, max_gap_m: float, gap_angle_deg: float) -> None:
@@ -130,12 +130,16 @@ class _Joins:
         ends = np.flatnonzero(np.repeat(self.lengths >= MIN_PIECE_M, 2))
         if len(ends) < 2:
             return []
-        tips = self.network.nodes[self.network.ends.ravel()[ends]]
-        outward = np.array([_tip(self.network.from_end(end))[1] for end in ends.tolist()])
-        pairs = cKDTree(tips).query_pairs(max(self.max_gap_m, MAX_MERGED_M), output_type="ndarray")
-        opposite = (outward[pairs[:, 0]] * outward[pairs[:, 1]]).sum(axis=1) < -np.cos(2 * np.arctan(self.slope))
-        pairs = np.sort(ends[pairs[opposite]], axis=1)
         nodes = self.network.ends.ravel()
+        tips, outward = (np.array(one) for one in zip(*(_tip(self.network.from_end(end)) for end in ends.tolist())))
+        pairs = cKDTree(tips).query_pairs(max(self.max_gap_m, MAX_MERGED_M), output_type="ndarray")
+        across = tips[pairs[:, 1]] - tips[pairs[:, 0]]
+        for ways, number in ((across, pairs[:, 0]), (-across, pairs[:, 1])):
+            # Once both ends are cut back, they are further apart.
+            ahead = (ways * outward[number]).sum(axis=1) + 2 * CUTS_M[-1]
+            aside = np.abs(ways[:, 0] * outward[number, 1] - ways[:, 1] * outward[number, 0])
+            pairs = np.where((ahead > 0) & (aside <= ahead * self.slope + STAIRS_M), pairs.T, -1).T
+        pairs = np.sort(ends[pairs[pairs[:, 0] >= 0]], axis=1)
         closes = (self.lengths >= MAX_MERGED_M) & (nodes[::2] != nodes[1::2])
         pairs = pairs[(pairs[:, 0] // 2 != pairs[:, 1] // 2) | closes[pairs[:, 0] // 2]]
         return [(one, other) for one, other in sorted(pairs.tolist())]
@@ -147,13 +151,13 @@ class _Joins:
         for cut_m in CUTS_M:
             if shortest_m < cut_m + 2 * SKIP_M and cut_m > 0:
                 break
-            ways = [cut_back(self.network.from_end(end), cut_m) for end in (one, other)]
+            way, other_way = (cut_back(self.network.from_end(end), cut_m) for end in (one, other))
             # A curve that replaces bent ends must not swerve to a rail beside them.
             transition_m = TRANSITION_M if cut_m <= SKIP_M else STEADY_TRANSITION_M
-            curve = bridge(*ways, misfit_m=MISFIT_M, transition_m=transition_m)
+            curve = bridge(way, other_way, misfit_m=MISFIT_M, transition_m=transition_m)
             if curve is None:
                 continue
-            cost = JOIN + CUT_PER_M * cut_m + self._cost(ways[0], ways[1], curve)
+            cost = JOIN + CUT_PER_M * cut_m + self._cost(way, other_way, curve)
             if cost < (found[0] if found else 2 * FREE):
                 found = cost, replace(curve, cuts_m=(curve.cuts_m[0] + cut_m, curve.cuts_m[1] + cut_m))
         return found
@@ -213,7 +217,7 @@ def _joined(network: LineNetwork, joins: _Joins) -> tuple[LineNetwork, bool]:
     for number in unused:
         own = {2 * number, 2 * number + 1}
         is_loose = any(joined.issuperset(set(at_node[nodes[end]]) - own) for end in own)
-        if is_loose and joins.lengths[number] < LINK_M or _is_beside(network.lines[number], drawn):
+        if is_loose and joins.lengths[number] < WING_M or _is_beside(network.lines[number], drawn):
             dropped.append(number)
     return weld_pairs(network.bridged(bridges, {}, dropped)), True
 

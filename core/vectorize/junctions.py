@@ -1,4 +1,4 @@
-"""Repair what the raster does to junctions: drop spurs, rungs and kinks, and run rails through nodes.
+"""Repair what the raster does to junctions: drop spurs and rungs, cut bends, and run rails through nodes.
 
 See docs/method.md section 4.6.
 """
