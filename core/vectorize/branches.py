@@ -5,7 +5,7 @@ See docs/method.md sections 4.10 and 4.11.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from itertools import combinations
 
 import numpy as np
@@ -28,7 +28,7 @@ from ..polyline import Polyline
 from ..progress import SILENT, Progress
 from .courses import MISFIT_M as KNOWN_MISFIT_M
 from .courses import SKIP_M, unseen_m
-from .junctions import DEFLECTION_DEG, DIRECTION_M, deflections, ends_by_node, unsteadiness
+from .junctions import DIRECTION_M, branchings, unsteadiness
 
 MAX_BACK_M = 40.0
 """Largest length by which a branch is extended back: on a radius of 2500 m, as at 1:26.5, two rails are 0.2 m apart
@@ -106,16 +106,6 @@ def _merged_m(one: np.ndarray, other: np.ndarray) -> float:
     count = min(len(one), len(other))
     apart_m = np.hypot(*(one[:count] - other[:count]).T)
     return -PartingLaw.fitted(SKIP_M + STEP_M * np.arange(count), apart_m, ARC).way_at(MISFIT_M)
-
-
-def branchings(network: LineNetwork) -> Iterator[tuple[int, int, list[int]]]:
-    """Yield the nodes in which one line end, the stem, continues in two others, the legs."""
-    for node, ends in ends_by_node(network):
-        if len({end // 2 for end in ends}) == 3 == len(ends) and node not in network.passes[:, 0]:
-            widest = deflections(network, ends).max(axis=1, where=~np.eye(3, dtype=bool), initial=0.0)
-            stem = int(widest.argmin())
-            if widest[stem] < DEFLECTION_DEG:
-                yield node, ends[stem], ends[:stem] + ends[stem + 1 :]
 
 
 def attach_branches(network: LineNetwork, seen: cKDTree, max_gap_m: float, progress: Progress = SILENT) -> LineNetwork:

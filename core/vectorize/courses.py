@@ -27,7 +27,7 @@ from ..lines.ends import (
 )
 from ..lines.network import LineNetwork
 from ..progress import SILENT, Progress
-from .junctions import DIRECTION_M, drop_spurs, ends_by_node, unsteadiness, weld_pairs
+from .junctions import DIRECTION_M, branchings, drop_spurs, ends_by_node, unsteadiness, weld_pairs
 
 MAX_MERGED_M = 14.0
 """Largest length that two crossing rails share. Heads of 76 mm in cells of 40 mm share 9 m at 1:26.5, and wing rails
@@ -223,17 +223,20 @@ def _joined(network: LineNetwork, joins: _Joins) -> tuple[LineNetwork, bool]:
 
 
 def _is_branching(network: LineNetwork, ends: tuple[int, int], taken: Collection[int], unused: Collection[int]) -> bool:
-    """Return whether a join passes nodes, connected by `unused` links, at which it leaves ends over on one side."""
+    """Return whether a join passes nodes, connected by `unused` links, in which one line continues in several.
+
+    It leaves a single end over then, or several that all leave the line to the same side of branchings.
+    """
     nodes, links = network.ends.ravel(), network.ends[list(unused)].T
     graph = coo_matrix((np.ones(len(unused)), tuple(links)), shape=(len(network.nodes),) * 2)
     place = connected_components(graph, directed=False)[1][nodes]
-    if place[ends[0]] != place[ends[1]]:
-        return False
     here = set(np.flatnonzero(place == place[ends[0]]).tolist()) - {2 * n + side for n in unused for side in (0, 1)}
-    left = here - set(taken)
-    ways = np.array([_tip(network.from_end(end))[1] for end in sorted(left)]).reshape(-1, 2)
-    same = ways @ _tip(network.from_end(ends[0]))[1] > 0
-    return bool(left) and here - left == set(ends) and bool(same.all() or not same.any())
+    left = sorted(here - set(taken))
+    if not here.issuperset(ends) or len(here) != 2 + len(left) or len(left) < 2:
+        return here.issuperset(ends) and len(here) == 3 and len(left) == 1
+    onward = [float(_tip(network.from_end(end))[1] @ _tip(network.from_end(ends[0]))[1]) > 0 for end in left]
+    known = {node for node, *_ in branchings(network)}
+    return len(set(onward)) == 1 and known.issuperset(nodes[list(here)].tolist())
 
 
 def best_pairs(gains: Mapping[tuple[int, int], float]) -> set[tuple[int, int]]:

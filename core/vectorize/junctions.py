@@ -5,7 +5,7 @@ See docs/method.md section 4.6.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -150,6 +150,16 @@ def ends_by_node(network: LineNetwork) -> Iterable[tuple[int, list[int]]]:
     order = np.argsort(flat, kind="stable")
     nodes, first = np.unique(flat[order], return_index=True)
     return zip(nodes.tolist(), (group.tolist() for group in np.split(order, first[1:])))
+
+
+def branchings(network: LineNetwork) -> Iterator[tuple[int, int, list[int]]]:
+    """Yield the nodes in which one line end, the stem, continues in two others, the legs."""
+    for node, ends in ends_by_node(network):
+        if len({end // 2 for end in ends}) == 3 == len(ends) and node not in network.passes[:, 0]:
+            widest = deflections(network, ends).max(axis=1, where=~np.eye(3, dtype=bool), initial=0.0)
+            stem = int(widest.argmin())
+            if widest[stem] < DEFLECTION_DEG:
+                yield node, ends[stem], ends[:stem] + ends[stem + 1 :]
 
 
 def unsteadiness(one: np.ndarray, other: np.ndarray, length_m: float) -> float:
