@@ -5,7 +5,7 @@ See docs/method.md section 4.8.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -27,7 +27,7 @@ from ..lines.ends import (
 )
 from ..lines.network import LineNetwork
 from ..progress import SILENT, Progress
-from .junctions import DIRECTION_M, branchings, drop_spurs, ends_by_node, unsteadiness, weld_pairs
+from .junctions import DIRECTION_M, KINK_DEG, branchings, drop_spurs, ends_by_node, unsteadiness, weld_pairs
 
 MAX_MERGED_M = 14.0
 """Largest length that two crossing rails share. Heads of 76 mm in cells of 40 mm share 9 m at 1:26.5, and wing rails
@@ -66,19 +66,19 @@ TURN_DEG = 4.0
 """Standard error of the directions of two ends against the way across: wing rails bend them by about as much."""
 
 FREE = 4.0
-"""Cost of an end that nothing continues, in squares of standard errors: two ends are joined up to √8 of them, 34 mm off
-one curve."""
+"""Cost of an end that nothing continues, in squares of standard errors: two ends are joined up to √7.5 of them, 33 mm
+off one curve."""
 
 HALF_USED = 1000.0
 """Cost of a free end of a link that is used: more than all that speaks for using it."""
 
 JOIN, CUT_PER_M, UNSEEN = 0.5, 0.3, 2.0
-"""What a join costs in any case, so that one is better than two; each metre that is cut off; and a part without cells
-that is as long as the longest gap."""
+"""What a join costs in any case, so that one is better than two; each metre that is cut off both ends; and a part
+without cells that is as long as the longest gap."""
 
-LINK_PER_M, PIECE_PER_M = 0.5, 1.0
-"""Cost of each metre of a link, and of another piece, that no rail uses. The shared part of two rails that cross at 1:9
-costs as much as a join."""
+LINK_PER_M, STUB_PER_M, ALONE_PER_M = 0.5, 1.0, 2.0
+"""Cost of each metre that no rail uses: of a link, of a piece with one free end, and of one with two, which nothing else
+explains. The shared part of two rails that cross at 1:9 costs as much as a join."""
 
 BESIDE_M, BESIDE_SHARE = 0.2, 0.7
 """An unused link of which a larger share is this close to the joins that replace it is left out. A check rail is 0.14 m
@@ -99,10 +99,9 @@ def follow_courses(
     `gap_angle_deg`. The network has no passes.
     """
     while True:
-        progress.check()
-        network, joined = _joined(network, _Joins(network, seen, max_gap_m, gap_angle_deg))
+        network, joined = _joined(network, _Joins(network, seen, max_gap_m, gap_angle_deg, progress))
         if not joined:
-            return drop_spurs(weld_pairs(network), WING_M)
+            return drop_spurs(weld_pairs(network, KINK_DEG), WING_M)
 
 
 class _Joins:
@@ -112,7 +111,9 @@ class _Joins:
     cross, a check rail that hides one, a rung between two.
     """
 
-    def __init__(self, network: LineNetwork, seen: cKDTree, max_gap_m: float, gap_angle_deg: float) -> None:
+    def __init__(
+        self, network: LineNetwork, seen: cKDTree, max_gap_m: float, gap_angle_deg: float, progress: Progress = SILENT
+    ) -> None:
         self.network, self.seen = network, seen
         self.max_gap_m, self.slope = max_gap_m, float(np.tan(np.radians(gap_angle_deg)))
         self.lengths = network.lengths()
@@ -121,6 +122,7 @@ class _Joins:
         self.costs: dict[tuple[int, int], float] = {}
         self.bridges: dict[tuple[int, int], Bridge] = {}
         for one, other in self._near():
+            progress.check()
             found = self._cheapest(one, other)
             if found is not None:
                 self.costs[one, other], self.bridges[one, other] = found
@@ -152,6 +154,8 @@ class _Joins:
             if shortest_m < cut_m + 2 * SKIP_M and cut_m > 0:
                 break
             way, other_way = (cut_back(self.network.from_end(end), cut_m) for end in (one, other))
+            if not self._face(_tip(way), _tip(other_way)):
+                continue
             # A curve that replaces bent ends must not swerve to a rail beside them.
             transition_m = TRANSITION_M if cut_m <= SKIP_M else STEADY_TRANSITION_M
             curve = bridge(way, other_way, misfit_m=MISFIT_M, transition_m=transition_m)
@@ -166,7 +170,7 @@ class _Joins:
         """Return what speaks against a curve from one way to another, given from their ends inward."""
         (tip, outward), (other_tip, other_outward) = _tip(one), _tip(other)
         gap_m = unseen_m(curve.points, self.seen)
-        if gap_m > self.max_gap_m or not self._faces(tip, outward, other_tip, other_outward):
+        if gap_m > self.max_gap_m:
             return np.inf
         bends = np.array([-_curvature(one), _curvature(other)])
         across = other_tip - tip
@@ -178,11 +182,11 @@ class _Joins:
         stray = unsteadiness(one, other, STEADY_M) ** 2 / (STRAY_M**2 + own_m**2)
         return turn + stray + UNSEEN * gap_m / max(self.max_gap_m, STEP_M)
 
-    def _faces(self, tip: np.ndarray, outward: np.ndarray, other_tip: np.ndarray, other_outward: np.ndarray) -> bool:
-        """Return whether two ends point at each other."""
-        across = other_tip - tip
-        for way, direction in ((across, outward), (-across, other_outward)):
-            ahead, aside = way @ direction, abs(way[0] * direction[1] - way[1] * direction[0])
+    def _face(self, one: tuple[np.ndarray, np.ndarray], other: tuple[np.ndarray, np.ndarray]) -> bool:
+        """Return whether two ends, tip and direction each, point at each other."""
+        for (tip, outward), (other_tip, _) in ((one, other), (other, one)):
+            way = other_tip - tip
+            ahead, aside = way @ outward, abs(way[0] * outward[1] - way[1] * outward[0])
             if ahead <= 0 or aside > ahead * self.slope + STAIRS_M:
                 return False
         return True
@@ -190,96 +194,120 @@ class _Joins:
     def chosen(self) -> list[tuple[int, int]]:
         """List the joins that together cost least."""
         free = np.where(self.is_link, HALF_USED, FREE)
+        free_ends = (self.network.degrees()[self.network.ends] == 1).sum(axis=1)
+        per_m = np.where(self.is_link, LINK_PER_M, np.where(free_ends == 2, ALONE_PER_M, STUB_PER_M))
         gains = {ends: free[ends[0] // 2] + free[ends[1] // 2] - cost for ends, cost in self.costs.items()}
         for number in np.flatnonzero(self.lengths < MAX_MERGED_M).tolist():
-            per_m = LINK_PER_M if self.is_link[number] else PIECE_PER_M
-            gains[2 * number, 2 * number + 1] = 2 * free[number] - per_m * self.lengths[number]
+            gains[2 * number, 2 * number + 1] = 2 * free[number] - per_m[number] * self.lengths[number]
         return sorted(ends for ends in best_pairs(gains) if ends in self.costs)
 
 
 def _joined(network: LineNetwork, joins: _Joins) -> tuple[LineNetwork, bool]:
     """Draw the joins that cost least, without the links that they replace; also returns whether there are any."""
-    nodes, at_node = network.ends.ravel(), dict(ends_by_node(network))
     chosen = joins.chosen()
     taken = {end for ends in chosen for end in ends}
     unused = [number for number in np.flatnonzero(joins.is_link).tolist() if not taken & {2 * number, 2 * number + 1}]
-    bridges = {ends: joins.bridges[ends] for ends in chosen if not _is_branching(network, ends, taken, unused)}
+    branching = _branching(network, chosen, unused)
+    bridges = _apart({ends: joins.bridges[ends] for ends in chosen if ends not in branching}, joins)
     if not bridges:
         return network, False
+    return weld_pairs(network.bridged(bridges, {}, _replaced(network, bridges, unused))), True
+
+
+def _apart(bridges: Mapping[tuple[int, int], Bridge], joins: _Joins) -> dict[tuple[int, int], Bridge]:
+    """Leave out bridges for which, with a cheaper one at the other end, more is cut off a piece than there is.
+
+    The next round finds them again, if they are any good, once the cheaper ones are drawn.
+    """
+    kept = dict(bridges)
     cuts_m = {end: cut_m for ends, curve in bridges.items() for end, cut_m in zip(ends, curve.cuts_m)}
     for ends in sorted(bridges, key=lambda ends: -joins.costs[ends]):
-        # What two joins cut off one piece, more than there is, is decided once the cheaper one is drawn.
         if any(cuts_m[end] + cuts_m.get(end ^ 1, 0.0) > joins.lengths[end // 2] for end in ends):
-            del bridges[ends], cuts_m[ends[0]], cuts_m[ends[1]]
+            del kept[ends], cuts_m[ends[0]], cuts_m[ends[1]]
+    return kept
+
+
+def _replaced(network: LineNetwork, bridges: Mapping[tuple[int, int], Bridge], unused: Collection[int]) -> list[int]:
+    """List the unused links that bridges replace: those beside them, and short ones that they leave with a free end."""
+    lengths, nodes, at_node = network.lengths(), network.ends.ravel(), dict(ends_by_node(network))
     joined = {end for ends in bridges for end in ends}
     drawn = cKDTree(np.concatenate([np.empty((0, 2)), *(curve.points for curve in bridges.values())]))
-    dropped = []
+    replaced = []
     for number in unused:
         own = {2 * number, 2 * number + 1}
         is_loose = any(joined.issuperset(set(at_node[nodes[end]]) - own) for end in own)
-        if is_loose and joins.lengths[number] < WING_M or _is_beside(network.lines[number], drawn):
-            dropped.append(number)
-    return weld_pairs(network.bridged(bridges, {}, dropped)), True
+        if is_loose and lengths[number] < WING_M or _is_beside(network.lines[number], drawn):
+            replaced.append(number)
+    return replaced
 
 
-def _is_branching(network: LineNetwork, ends: tuple[int, int], taken: Collection[int], unused: Collection[int]) -> bool:
-    """Return whether a join passes nodes, connected by `unused` links, in which one line continues in several.
+def _branching(
+    network: LineNetwork, chosen: Collection[tuple[int, int]], unused: Collection[int]
+) -> set[tuple[int, int]]:
+    """Find the joins that pass nodes, connected by `unused` links, in which one line continues in several.
 
-    It leaves a single end over then, or several that all leave the line to the same side of branchings.
+    Such a join leaves a single end over, or several that all leave the line to the same side of branchings.
     """
     nodes, links = network.ends.ravel(), network.ends[list(unused)].T
     graph = coo_matrix((np.ones(len(unused)), tuple(links)), shape=(len(network.nodes),) * 2)
     place = connected_components(graph, directed=False)[1][nodes]
-    here = set(np.flatnonzero(place == place[ends[0]]).tolist()) - {2 * n + side for n in unused for side in (0, 1)}
-    left = sorted(here - set(taken))
-    if not here.issuperset(ends) or len(here) != 2 + len(left) or len(left) < 2:
-        return here.issuperset(ends) and len(here) == 3 and len(left) == 1
-    onward = [float(_tip(network.from_end(end))[1] @ _tip(network.from_end(ends[0]))[1]) > 0 for end in left]
+    place[[2 * number + side for number in unused for side in (0, 1)]] = -1
     known = {node for node, *_ in branchings(network)}
-    return len(set(onward)) == 1 and known.issuperset(nodes[list(here)].tolist())
+    taken = {end for ends in chosen for end in ends}
+    found = set()
+    for ends in chosen:
+        here = np.flatnonzero(place == place[ends[0]])
+        left = [end for end in here.tolist() if end not in taken]
+        if place[ends[0]] == place[ends[1]] and left and len(here) == len(left) + 2:
+            ahead = _tip(network.from_end(ends[0]))[1]
+            onward = {float(_tip(network.from_end(end))[1] @ ahead) > 0 for end in left}
+            if len(left) == 1 or len(onward) == 1 and known.issuperset(nodes[here].tolist()):
+                found.add(ends)
+    return found
 
 
 def best_pairs(gains: Mapping[tuple[int, int], float]) -> set[tuple[int, int]]:
-    """Choose pairs, each number in one of them at most, whose gains have the largest sum.
+    """Choose pairs, each number in one of them at most, whose gains have about the largest sum.
 
     The assignment of numbers to numbers with the largest gain pairs most of them. Where it forms a ring of three or
-    more instead, the best pairs with and without its best pair are compared.
+    more instead, the best of the pairs of neighbours are taken, which may miss the largest sum by a little.
     """
     chosen: set[tuple[int, int]] = set()
-    for part in _parts({pair: gain for pair, gain in gains.items() if gain > 0}):
-        chosen |= _best_of_part(part)
+    left = {pair: gain for pair, gain in gains.items() if gain > 0}
+    while left:
+        for ring in _rings(left):
+            chosen |= max(_pairs_along(ring, left), key=lambda pairs: sum(left[pair] for pair in pairs))
+        taken = {number for pair in chosen for number in pair}
+        left = {pair: gain for pair, gain in left.items() if not taken.intersection(pair)}
     return chosen
 
 
-def _best_of_part(gains: dict[tuple[int, int], float]) -> set[tuple[int, int]]:
+def _rings(gains: Mapping[tuple[int, int], float]) -> list[list[int]]:
+    """Assign numbers to numbers with the largest gain, and list those that are assigned to each other in a ring."""
     numbers = sorted({number for pair in gains for number in pair})
     gain = np.zeros((len(numbers), len(numbers)))
     for pair, value in gains.items():
         row, column = np.searchsorted(numbers, pair)
         gain[row, column] = gain[column, row] = value
     _, partner = linear_sum_assignment(gain, maximize=True)
-    rings = np.flatnonzero((partner[partner] != np.arange(len(numbers))) & (gain[np.arange(len(numbers)), partner] > 0))
-    if not len(rings):
-        return {pair for pair in gains if partner[numbers.index(pair[0])] == numbers.index(pair[1])}
-    best = max(rings.tolist(), key=lambda row: gain[row, partner[row]])
-    one, other = sorted((numbers[best], numbers[partner[best]]))
-    others = {pair: value for pair, value in gains.items() if not {one, other} & set(pair)}
-    options = best_pairs(others) | {(one, other)}, best_pairs({p: v for p, v in gains.items() if p != (one, other)})
-    return max(options, key=lambda pairs: sum(gains[pair] for pair in pairs))
+    rings, seen = [], set()
+    for first in range(len(numbers)):
+        ring = []
+        while first not in seen:
+            seen.add(first)
+            ring.append(numbers[first])
+            first = int(partner[first])
+        if len(ring) > 1:
+            rings.append(ring)
+    return rings
 
 
-def _parts(gains: dict[tuple[int, int], float]) -> list[dict[tuple[int, int], float]]:
-    """Split pairs into groups that share no number."""
-    if not gains:
-        return []
-    numbers, pairs = np.unique(list(gains), return_inverse=True)
-    one, other = pairs.reshape(-1, 2).T
-    graph = coo_matrix((np.ones(len(one)), (one, other)), shape=(len(numbers),) * 2)
-    count, part = connected_components(graph, directed=False)
-    groups: list[dict[tuple[int, int], float]] = [{} for _ in range(count)]
-    for (pair, gain), number in zip(gains.items(), one.tolist()):
-        groups[part[number]][pair] = gain
-    return groups
+def _pairs_along(ring: Sequence[int], gains: Mapping[tuple[int, int], float]) -> Iterator[set[tuple[int, int]]]:
+    """Yield the sets of pairs of neighbours in a ring, begun at each of its numbers, that have a gain."""
+    for first in range(len(ring)):
+        turned = [*ring[first:], *ring[:first]]
+        pairs = [(min(pair), max(pair)) for pair in zip(turned[::2], turned[1::2])]
+        yield {pair for pair in pairs if pair in gains}
 
 
 def unseen_m(points: np.ndarray, seen: cKDTree) -> float:

@@ -31,6 +31,9 @@ DEFLECTION_DEG = 15.0
 TURNED_BACK_DEG = 90.0
 """Two lines that meet more sharply are not one rail, but the legs of a switch whose stem is missing."""
 
+KINK_DEG = 25.0
+"""Two lines that meet more sharply are not one rail, whatever else they may be."""
+
 DIRECTION_M = 2.5
 """Length over which directions at a node are compared: longer than the merged part of a 1:9 frog."""
 
@@ -57,15 +60,15 @@ def clean_junctions(network: LineNetwork, head_width_m: float) -> LineNetwork:
     return drop_spurs(weld_pairs(network), SPUR_M)
 
 
-def weld_pairs(network: LineNetwork) -> LineNetwork:
-    """Join lines at nodes in which exactly two different lines end and none passes; separate them if they turn back."""
+def weld_pairs(network: LineNetwork, most_deg: float = TURNED_BACK_DEG) -> LineNetwork:
+    """Join lines at nodes in which exactly two different lines end and none passes; separate them if they turn more."""
     plain = network.degrees() == 2
     plain[network.passes[:, 0]] = False
     partner: dict[int, int] = {}
     for one, other in (pair for node, pair in ends_by_node(network) if plain[node]):
         if one // 2 == other // 2:
             continue
-        if deflections(network, [one, other])[0, 1] > TURNED_BACK_DEG:
+        if deflections(network, [one, other])[0, 1] > most_deg:
             network = network.with_end(other, network.from_end(other)[:1], 1)
         else:
             partner[one], partner[other] = other, one

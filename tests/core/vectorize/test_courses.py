@@ -7,6 +7,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from rail_extract.core.lines.network import LineNetwork
+from rail_extract.core.parameters import Parameters
 from rail_extract.core.polyline import Polyline, project
 from rail_extract.core.vectorize.courses import best_pairs, follow_courses
 from rail_extract.core.vectorize.junctions import cut_bends
@@ -35,7 +36,9 @@ def network(legs, links, nodes):
 
 def resolved(drawn):
     """Follow the courses of lines that cells show, with the longest gap and the angle of the defaults."""
-    return follow_courses(cut_bends(drawn), cKDTree(np.concatenate(drawn.lines)), 5.0, 15.0)
+    return follow_courses(
+        cut_bends(drawn), cKDTree(np.concatenate(drawn.lines)), Parameters.max_gap_m, Parameters.gap_angle_deg
+    )
 
 
 def check_that_two_rails_cross(found):
@@ -142,7 +145,7 @@ def followed(line):
     sides = 0.036 * Polyline(line).normals
     network = LineNetwork((line,), line[[0, -1]], np.array([[0, 1]]))
     seen = cKDTree(np.concatenate([line + sides, line - sides]))
-    (only,) = follow_courses(cut_bends(network), seen, 5.0, 15.0).lines
+    (only,) = follow_courses(cut_bends(network), seen, Parameters.max_gap_m, Parameters.gap_angle_deg).lines
     return only
 
 
@@ -180,8 +183,32 @@ def test_curves_of_trams_and_turnouts_stay(radius_m, length_m):
     assert farthest(followed(line), line) < 0.02
 
 
-@pytest.mark.parametrize("seed", range(5))
-def test_the_best_pairs_are_those_with_the_largest_sum(seed):
+@pytest.mark.parametrize(("length_m", "gap_m"), [(0.5, 0.5), (1.0, 1.0), (1.5, 2.0), (2.0, 3.0)])
+def test_a_rail_that_is_seen_in_short_pieces_is_one_line(length_m, gap_m):
+    starts = np.arange(0.0, LENGTH_M, length_m + gap_m)
+    pieces = [np.column_stack([np.linspace(x, x + length_m, 9), np.zeros(9)]) for x in starts]
+    ends = np.concatenate([piece[[0, -1]] for piece in pieces])
+    found = resolved(LineNetwork(tuple(pieces), ends, np.arange(len(ends)).reshape(-1, 2)))
+    (only,) = found.lines
+    assert np.ptp(only[:, 0]) == pytest.approx(starts[-1] + length_m)
+
+
+@pytest.mark.parametrize("turn_deg", [30.0, 45.0, 80.0])
+def test_lines_that_meet_in_a_kink_are_two(turn_deg):
+    turn = np.radians(turn_deg)
+    x = np.arange(0.0, 20.0, 0.2)[:, None]
+    line = np.concatenate([x[::-1] * [-1.0, 0.0], x[1:] * [np.cos(turn), np.sin(turn)]])
+    assert len(resolved(LineNetwork((line,), line[[0, -1]], np.array([[0, 1]]))).lines) == 2
+
+
+def test_two_copies_of_a_line_are_not_joined():
+    line = rail()[:100]
+    found = resolved(LineNetwork((line, line), line[[0, -1, 0, -1]], np.arange(4).reshape(-1, 2)))
+    assert len(found.lines) == 2
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_the_best_pairs_have_about_the_largest_sum(seed):
     random = np.random.default_rng(seed)
     gains = {pair: float(random.uniform(-1, 5)) for pair in combinations(range(6), 2) if random.random() < 0.7}
     chosen = best_pairs(gains)
@@ -194,4 +221,11 @@ def test_the_best_pairs_are_those_with_the_largest_sum(seed):
         with_first = [gains.get((first, one), -9.0) + best([two for two in rest if two != one]) for one in rest]
         return max(best(rest), *with_first)
 
-    assert sum(gains[pair] for pair in chosen) == pytest.approx(best(list(range(6))))
+    assert sum(gains[pair] for pair in chosen) >= 0.75 * best(list(range(6)))
+
+
+def test_pairs_of_a_large_tangle_are_found_at_once():
+    """Comparing all ways to resolve its rings would take years."""
+    gains = {(one, (one + step) % 300): 1.0 for one in range(300) for step in (1, 2, 3)}
+    gains = {(min(pair), max(pair)): gain for pair, gain in gains.items()}
+    assert len(best_pairs(gains)) > 140

@@ -29,7 +29,7 @@ def opened(lines):
 def test_a_slip_is_found_where_no_lines_meet():
     network, slips = opened(lines_beside_a_slip())
     np.testing.assert_allclose(sorted(slip.cross.place[1] for slip in slips), [0.0, SPACING_M], atol=0.02)
-    network = add_curves(follow_courses(network, cKDTree(np.concatenate(network.lines)), 5.0, 15.0), slips)
+    network = add_curves(follow_courses(network, cKDTree(np.concatenate(network.lines)), 5.0, 10.0), slips)
     assert len(network.lines) == 6
     straight = [line for line in network.lines if abs(line[-1, 1] - line[0, 1]) > 2.0]
     assert len(straight) == 4

@@ -235,7 +235,7 @@ def test_a_weed_on_the_side_of_a_rail_is_not_a_branch():
 
 @pytest.mark.parametrize("aside_m", [0.16, 0.2])
 def test_a_crossing_whose_leg_a_wing_rail_bends_sharply_is_two_rails(aside_m):
-    """As in world 9842, where the rails changed places."""
+    """As in world 9842, where the rails changed places; the rail goes on along its own course."""
     slope = 1 / 12
     falling = np.array(
         [[-30.0, 30 * slope], [-1.8, 1.8 * slope], [-0.7, aside_m], [-0.67, 0.67 * slope], [30.0, -30 * slope]]
