@@ -77,8 +77,8 @@ JOIN, CUT_PER_M, UNSEEN = 0.5, 0.3, 2.0
 without cells that is as long as the longest gap."""
 
 LINK_PER_M, STUB_PER_M, ALONE_PER_M = 0.5, 1.0, 2.0
-"""Cost of each metre that no rail uses: of a link, of a piece with one free end, and of one with two, which nothing else
-explains. The shared part of two rails that cross at 1:9 costs as much as a join."""
+"""Cost of each metre that no rail uses: of a link, of a piece with one free end, and of one with two, which nothing
+else explains. The shared part of two rails that cross at 1:9 costs as much as a join."""
 
 BESIDE_M, BESIDE_SHARE = 0.2, 0.7
 """An unused link of which a larger share is this close to the joins that replace it is left out. A check rail is 0.14 m
