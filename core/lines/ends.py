@@ -92,7 +92,7 @@ def bridge(
 
     The curve is a cubic over the straight line across the gap, with the curvature of rails as prior. A connection to a
     neighbouring rail is refused because it needs two opposite bends. None if the curve misses either line by a median
-    of more than `misfit_m`, bends more than a rail, or would have to turn back along a line, or if both have one middle.
+    of more than `misfit_m`, bends more than a rail, or would turn back along a line, and if both have the same middle.
 
     `transition_m` is the shortest length in which the curvature may rise from 0 to 1 / `MIN_RADIUS_M`; `fit_m` is the
     length of either line that the curve explains.
