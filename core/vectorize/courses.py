@@ -101,7 +101,7 @@ def follow_courses(
     while True:
         network, joined = _joined(network, _Joins(network, seen, max_gap_m, gap_angle_deg, progress))
         if not joined:
-            return drop_spurs(weld_pairs(network, KINK_DEG), WING_M)
+            return _without_wings(drop_spurs(weld_pairs(network, KINK_DEG), WING_M))
 
 
 class _Joins:
@@ -212,6 +212,23 @@ def _joined(network: LineNetwork, joins: _Joins) -> tuple[LineNetwork, bool]:
     if not bridges:
         return network, False
     return weld_pairs(network.bridged(bridges, {}, _replaced(network, bridges, unused))), True
+
+
+def _without_wings(network: LineNetwork) -> LineNetwork:
+    """Drop lines of up to `WING_M` with a free end that run beside longer ones."""
+    is_short = network.lengths() < WING_M
+    longer = cKDTree(
+        np.concatenate([np.empty((0, 2)), *(even_points(network.lines[n]) for n in np.flatnonzero(~is_short))])
+    )
+    ends_freely = (network.degrees()[network.ends] == 1).any(axis=1)
+    keep = np.array(
+        [
+            not (short and free and _is_beside(line, longer))
+            for line, short, free in zip(network.lines, is_short, ends_freely)
+        ],
+        dtype=bool,
+    )
+    return weld_pairs(network.select(keep), KINK_DEG)
 
 
 def _apart(bridges: Mapping[tuple[int, int], Bridge], joins: _Joins) -> dict[tuple[int, int], Bridge]:

@@ -87,7 +87,7 @@ def test_chainages_that_are_given_are_those_of_places_and_feet(seed):
 @settings(deadline=None)
 def test_the_nearest_place_is_no_farther_than_any_other(seed):
     lines = [winding(seed, 3), winding(seed + 1, 3)]
-    chords = Chords.of(map(Polyline, lines), 0.5)
+    chords = Chords.of(map(Polyline, lines), 0.25)
     places = np.concatenate(lines)[:, :2] + np.random.default_rng(seed).uniform(-2, 2, (80, 2))
     feet, number = chords.nearest(places)
     dense = np.concatenate([Polyline(line).resampled(0.01).xyz for line in lines])[:, :2]
