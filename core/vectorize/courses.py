@@ -217,17 +217,12 @@ def _joined(network: LineNetwork, joins: _Joins) -> tuple[LineNetwork, bool]:
 def _without_wings(network: LineNetwork) -> LineNetwork:
     """Drop lines of up to `WING_M` with a free end that run beside longer ones."""
     is_short = network.lengths() < WING_M
-    longer = cKDTree(
-        np.concatenate([np.empty((0, 2)), *(even_points(network.lines[n]) for n in np.flatnonzero(~is_short))])
-    )
     ends_freely = (network.degrees()[network.ends] == 1).any(axis=1)
-    keep = np.array(
-        [
-            not (short and free and _is_beside(line, longer))
-            for line, short, free in zip(network.lines, is_short, ends_freely)
-        ],
-        dtype=bool,
-    )
+    points = [even_points(line) for line, short in zip(network.lines, is_short) if not short]
+    longer = cKDTree(np.concatenate([np.empty((0, 2)), *points]))
+    keep = np.ones(len(network.lines), dtype=bool)
+    for number in np.flatnonzero(is_short & ends_freely).tolist():
+        keep[number] = not _is_beside(network.lines[number], longer)
     return weld_pairs(network.select(keep), KINK_DEG)
 
 
@@ -245,17 +240,9 @@ def _apart(bridges: Mapping[tuple[int, int], Bridge], joins: _Joins) -> dict[tup
 
 
 def _replaced(network: LineNetwork, bridges: Mapping[tuple[int, int], Bridge], unused: Collection[int]) -> list[int]:
-    """List the unused links that bridges replace: those beside them, and short ones that they leave with a free end."""
-    lengths, nodes, at_node = network.lengths(), network.ends.ravel(), dict(ends_by_node(network))
-    joined = {end for ends in bridges for end in ends}
+    """List the unused links that run beside bridges."""
     drawn = cKDTree(np.concatenate([np.empty((0, 2)), *(curve.points for curve in bridges.values())]))
-    replaced = []
-    for number in unused:
-        own = {2 * number, 2 * number + 1}
-        is_loose = any(joined.issuperset(set(at_node[nodes[end]]) - own) for end in own)
-        if is_loose and lengths[number] < WING_M or _is_beside(network.lines[number], drawn):
-            replaced.append(number)
-    return replaced
+    return [number for number in unused if _is_beside(network.lines[number], drawn)]
 
 
 def _branching(
