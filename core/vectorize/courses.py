@@ -101,7 +101,7 @@ def follow_courses(
     while True:
         network, joined = _joined(network, _Joins(network, seen, max_gap_m, gap_angle_deg, progress))
         if not joined:
-            return _without_wings(drop_spurs(weld_pairs(network, KINK_DEG), WING_M))
+            return weld_pairs(network, KINK_DEG)
 
 
 class _Joins:
@@ -214,7 +214,7 @@ def _joined(network: LineNetwork, joins: _Joins) -> tuple[LineNetwork, bool]:
     return weld_pairs(network.bridged(bridges, {}, _replaced(network, bridges, unused))), True
 
 
-def _without_wings(network: LineNetwork) -> LineNetwork:
+def drop_wings(network: LineNetwork) -> LineNetwork:
     """Drop lines of up to `WING_M` with a free end that run beside longer ones."""
     is_short = network.lengths() < WING_M
     ends_freely = (network.degrees()[network.ends] == 1).any(axis=1)
