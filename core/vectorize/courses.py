@@ -27,7 +27,7 @@ from ..lines.ends import (
 )
 from ..lines.network import LineNetwork
 from ..progress import SILENT, Progress
-from .junctions import DIRECTION_M, KINK_DEG, branchings, drop_spurs, unsteadiness, weld_pairs
+from .junctions import DIRECTION_M, KINK_DEG, branchings, unsteadiness, weld_pairs
 
 MAX_MERGED_M = 14.0
 """Largest length that two crossing rails share. Heads of 76 mm in cells of 40 mm share 9 m at 1:26.5, and wing rails

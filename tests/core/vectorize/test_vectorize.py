@@ -245,3 +245,11 @@ def test_a_crossing_whose_leg_a_wing_rail_bends_sharply_is_two_rails(aside_m):
     for line in lines:
         sign = np.sign((line[-1] - line[0]).prod())
         assert np.abs(line[:, 1] - sign * slope * line[:, 0]).max() < 0.05
+
+
+def test_short_legs_of_rails_that_cross_at_a_right_angle_are_no_spurs():
+    across = np.array([[-3.0, 0.0], [3.0, 0.0]])
+    rails = [across + [0.0, left] for left in (-0.75, 0.75)]
+    lines = vectorize(draw([*rails, *(rail[:, ::-1] for rail in rails)]), HEAD_M).lines
+    np.testing.assert_allclose([length_along(line)[-1] for line in lines], 6.0, atol=0.1)
+    assert len(lines) == 4
