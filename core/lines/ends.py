@@ -92,13 +92,13 @@ def bridge(
 
     The curve is a cubic over the straight line across the gap, with the curvature of rails as prior. A connection to a
     neighbouring rail is refused because it needs two opposite bends. None if the curve misses either line by a median
-    of more than `misfit_m`, bends more than a rail, or would turn back along a line, and if both have the same middle.
+    of more than `misfit_m`, bends more than a rail, or would turn back along a line, and if both are in one place.
 
     `transition_m` is the shortest length in which the curvature may rise from 0 to 1 / `MIN_RADIUS_M`; `fit_m` is the
     length of either line that the curve explains.
     """
     before, after = even_points(one, fit_m)[::-1], even_points(other, fit_m)
-    if np.allclose(before.mean(axis=0), after.mean(axis=0)):
+    if np.hypot(*(after.mean(axis=0) - before.mean(axis=0))) < STEP_M:
         return None
     origin, axes = _frame(before, after)
     before, after = (before - origin) @ axes.T, (after - origin) @ axes.T

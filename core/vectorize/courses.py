@@ -151,7 +151,7 @@ class _Joins:
         found: tuple[float, Bridge] | None = None
         shortest_m = min(self.lengths[one // 2], self.lengths[other // 2])
         for cut_m in CUTS_M:
-            if shortest_m < cut_m + 2 * SKIP_M and cut_m > 0:
+            if shortest_m < cut_m + SKIP_M and cut_m > 0:
                 break
             way, other_way = (cut_back(self.network.from_end(end), cut_m) for end in (one, other))
             if not self._face(_tip(way), _tip(other_way)):
@@ -211,7 +211,7 @@ def _joined(network: LineNetwork, joins: _Joins) -> tuple[LineNetwork, bool]:
     bridges = _apart({ends: joins.bridges[ends] for ends in chosen if ends not in branching}, joins)
     if not bridges:
         return network, False
-    return weld_pairs(network.bridged(bridges, {}, _replaced(network, bridges, unused))), True
+    return weld_pairs(network.bridged(bridges, {}, _replaced(network, bridges, unused)), KINK_DEG), True
 
 
 def drop_wings(network: LineNetwork) -> LineNetwork:

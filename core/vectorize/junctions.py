@@ -214,5 +214,6 @@ def _bends(line: np.ndarray) -> list[float]:
     direction = np.degrees(np.unwrap(np.arctan2(ahead[1], ahead[0])))
     bend = direction[width:] - direction[:-width]
     odd = np.abs(bend - median_filter(bend, int(STEADY_BEND_M / STEP_M), mode="nearest"))
+    odd = np.where(np.abs(bend) > KINK_DEG, np.abs(bend), odd)
     peaks = find_peaks(odd, height=BEND_DEG, distance=int(SHORTEST_BEND_M / STEP_M))[0]
     return (Polyline(line).length_m * (peaks + width - 0.5) / (len(points) - 1)).tolist()

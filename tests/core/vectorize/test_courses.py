@@ -229,3 +229,10 @@ def test_pairs_of_a_large_tangle_are_found_at_once():
     gains = {(one, (one + step) % 300): 1.0 for one in range(300) for step in (1, 2, 3)}
     gains = {(min(pair), max(pair)): gain for pair, gain in gains.items()}
     assert len(best_pairs(gains)) > 140
+
+
+def test_far_from_the_origin_rails_cross_as_near_it():
+    legs = [(0, leg(side, slope, 0.2)) for side in (-1, 1) for slope in (SLOPE, -SLOPE)]
+    near = network(legs, (), [(0.0, 0.0)])
+    far = LineNetwork(tuple(line + [5e5, 3e6] for line in near.lines), near.nodes + [5e5, 3e6], near.ends)
+    assert len(resolved(far).lines) == len(resolved(near).lines) == 2
