@@ -198,7 +198,9 @@ class _Joins:
         per_m = np.where(self.is_link, LINK_PER_M, np.where(free_ends == 2, ALONE_PER_M, STUB_PER_M))
         gains = {ends: free[ends[0] // 2] + free[ends[1] // 2] - cost for ends, cost in self.costs.items()}
         for number in np.flatnonzero(self.lengths < MAX_MERGED_M).tolist():
-            gains[2 * number, 2 * number + 1] = 2 * free[number] - per_m[number] * self.lengths[number]
+            # The free end of a piece that ends in a node is the end of a rail, whether it is used or not.
+            saved = free[number] * (1 if free_ends[number] == 1 else 2)
+            gains[2 * number, 2 * number + 1] = saved - per_m[number] * self.lengths[number]
         return sorted(ends for ends in best_pairs(gains) if ends in self.costs)
 
 

@@ -247,9 +247,12 @@ def test_a_crossing_whose_leg_a_wing_rail_bends_sharply_is_two_rails(aside_m):
         assert np.abs(line[:, 1] - sign * slope * line[:, 0]).max() < 0.05
 
 
-def test_short_legs_of_rails_that_cross_at_a_right_angle_are_no_spurs():
+@pytest.mark.parametrize("angle_deg", [90.0, 60.0, 45.0])
+def test_rails_with_short_legs_cross(angle_deg):
     across = np.array([[-3.0, 0.0], [3.0, 0.0]])
     rails = [across + [0.0, left] for left in (-0.75, 0.75)]
-    lines = vectorize(draw([*rails, *(rail[:, ::-1] for rail in rails)]), HEAD_M).lines
-    np.testing.assert_allclose([length_along(line)[-1] for line in lines], 6.0, atol=0.1)
+    turn = np.radians(angle_deg)
+    turned = np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
+    lines = vectorize(draw([*rails, *(rail @ turned for rail in rails)]), HEAD_M).lines
+    np.testing.assert_allclose([length_along(line)[-1] for line in lines], 6.0, atol=0.15)
     assert len(lines) == 4
