@@ -1,6 +1,6 @@
 """Rails keep their courses: of all ways to continue lines through junctions and across gaps, the steadiest is drawn.
 
-See docs/method.md section 4.8.
+See docs/method.md sections 4.8 and 4.9.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ CUTS_M = (0.0, SKIP_M, 1.0, 2.0, 3.0)
 even until two ends overlap side by side."""
 
 WING_M = 3.0
-"""What no rail continues up to this length at a junction is a wing rail, a rung or a swerve, and is left out."""
+"""A line up to this length that ends freely beside a longer one is a wing rail, and is left out."""
 
 MISFIT_M = 0.015
 """Misfit allowed to the lines that a rail continues: wing rails widen them. The cost of a join contains the rest."""
@@ -81,8 +81,8 @@ LINK_PER_M, STUB_PER_M, ALONE_PER_M = 0.5, 1.0, 2.0
 else explains. The shared part of two rails that cross at 1:9 costs as much as a join."""
 
 BESIDE_M, BESIDE_SHARE = 0.2, 0.7
-"""An unused link of which a larger share is this close to the joins that replace it is left out. A check rail is 0.14 m
-from the axis of its rail."""
+"""An unused link of which a larger share is this close to the joins that replace it is left out, and so is a wing rail
+beside a line. A check rail is 0.14 m from the axis of its rail."""
 
 
 def follow_courses(
@@ -138,9 +138,7 @@ class _Joins:
         across = tips[pairs[:, 1]] - tips[pairs[:, 0]]
         for ways, number in ((across, pairs[:, 0]), (-across, pairs[:, 1])):
             # Once both ends are cut back, they are further apart.
-            ahead = (ways * outward[number]).sum(axis=1) + 2 * CUTS_M[-1]
-            aside = np.abs(ways[:, 0] * outward[number, 1] - ways[:, 1] * outward[number, 0])
-            pairs = np.where((ahead > 0) & (aside <= ahead * self.slope + STAIRS_M), pairs.T, -1).T
+            pairs = np.where(_points_along(outward[number], ways, self.slope, 2 * CUTS_M[-1]), pairs.T, -1).T
         pairs = np.sort(ends[pairs[pairs[:, 0] >= 0]], axis=1)
         closes = (self.lengths >= MAX_MERGED_M) & (nodes[::2] != nodes[1::2])
         pairs = pairs[(pairs[:, 0] // 2 != pairs[:, 1] // 2) | closes[pairs[:, 0] // 2]]
@@ -154,21 +152,28 @@ class _Joins:
             if shortest_m < cut_m + SKIP_M and cut_m > 0:
                 break
             way, other_way = (cut_back(self.network.from_end(end), cut_m) for end in (one, other))
-            if not self._face(_tip(way), _tip(other_way)):
+            (tip, outward), (other_tip, other_outward) = tips = _tip(way), _tip(other_way)
+            across = other_tip - tip
+            if not _points_along(outward, across, self.slope) or not _points_along(other_outward, -across, self.slope):
                 continue
             # A curve that replaces bent ends must not swerve to a rail beside them.
             transition_m = TRANSITION_M if cut_m <= SKIP_M else STEADY_TRANSITION_M
             curve = bridge(way, other_way, misfit_m=MISFIT_M, transition_m=transition_m)
             if curve is None:
                 continue
-            cost = JOIN + CUT_PER_M * cut_m + self._cost(way, other_way, curve)
+            cost = JOIN + CUT_PER_M * cut_m + self._cost((way, other_way), tips, curve)
             if cost < (found[0] if found else 2 * FREE):
                 found = cost, replace(curve, cuts_m=(curve.cuts_m[0] + cut_m, curve.cuts_m[1] + cut_m))
         return found
 
-    def _cost(self, one: np.ndarray, other: np.ndarray, curve: Bridge) -> float:
-        """Return what speaks against a curve from one way to another, given from their ends inward."""
-        (tip, outward), (other_tip, other_outward) = _tip(one), _tip(other)
+    def _cost(
+        self,
+        ways: tuple[np.ndarray, np.ndarray],
+        tips: tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]],
+        curve: Bridge,
+    ) -> float:
+        """Return what speaks against a curve from one way to another, given from their ends inward, with their tips."""
+        (one, other), ((tip, outward), (other_tip, other_outward)) = ways, tips
         gap_m = unseen_m(curve.points, self.seen)
         if gap_m > self.max_gap_m:
             return np.inf
@@ -181,15 +186,6 @@ class _Joins:
         turn = float(np.sum(turns**2)) / np.radians(TURN_DEG) ** 2
         stray = unsteadiness(one, other, STEADY_M) ** 2 / (STRAY_M**2 + own_m**2)
         return turn + stray + UNSEEN * gap_m / max(self.max_gap_m, STEP_M)
-
-    def _face(self, one: tuple[np.ndarray, np.ndarray], other: tuple[np.ndarray, np.ndarray]) -> bool:
-        """Return whether two ends, tip and direction each, point at each other."""
-        for (tip, outward), (other_tip, _) in ((one, other), (other, one)):
-            way = other_tip - tip
-            ahead, aside = way @ outward, abs(way[0] * outward[1] - way[1] * outward[0])
-            if ahead <= 0 or aside > ahead * self.slope + STAIRS_M:
-                return False
-        return True
 
     def chosen(self) -> list[tuple[int, int]]:
         """List the joins that together cost least."""
@@ -322,11 +318,19 @@ def unseen_m(points: np.ndarray, seen: cKDTree) -> float:
 
 
 def _is_beside(line: np.ndarray, drawn: cKDTree) -> bool:
-    """Return whether most of a line is so close to bridges that these explain it, given their points."""
+    """Return whether most of a line is so close to other lines that these explain it, given their points."""
     return bool(drawn.n) and float(np.mean(drawn.query(even_points(line))[0] < BESIDE_M)) > BESIDE_SHARE
 
 
+def _points_along(outward: np.ndarray, way: np.ndarray, slope: float, further_m: float = 0.0) -> np.ndarray:
+    """Return whether directions point along ways, (..., 2) metres each and prolonged by `further_m`, within a slope."""
+    ahead = (way * outward).sum(axis=-1) + further_m
+    aside = np.abs(way[..., 0] * outward[..., 1] - way[..., 1] * outward[..., 0])
+    return (ahead > 0) & (aside <= ahead * slope + STAIRS_M)
+
+
 def _tip(line: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return where a line, given from its end inward, ends, (2,), and the unit vector out of it, (2,)."""
     return tip_and_direction(even_points(line, DIRECTION_M))
 
 
