@@ -346,12 +346,15 @@ def likelier_width(lines: Sequence[np.ndarray], xyz: np.ndarray, widths_m: Seque
 def head_noise(points: HeadPoints) -> float:
     """Return the noise about a head in the points of a line, across and in height together; infinite without points.
 
-    It is the logarithm of their product, in metres, and smaller where points show a sharper head.
+    It is the mean logarithm of their product, in metres, and smaller where points show a sharper head. Points on no
+    part of it are anywhere in the bins: one of two heads side by side is as sharp as a single one, but leaves the other
+    out.
     """
     grid, outline = Grid.of(points.width_m), Outline.of(points.width_m)
-    fits = [(counts.sum(), fit_section(counts, outline, grid).place[4:6].sum()) for counts in _counted(points, grid)]
-    weight, noise = np.array(fits).reshape(-1, 2).T
-    return float(np.average(noise, weights=weight)) if len(fits) else np.inf
+    anywhere = np.log(np.ptp(grid.left) * np.ptp(grid.up) / 12)
+    fits = [(counts.sum(), fit_section(counts, outline, grid)) for counts in _counted(points, grid)]
+    noise = [one.place[4:6].sum() + one.shares[-1] * (anywhere - one.place[4:6].sum()) for _, one in fits]
+    return float(np.average(noise, weights=[count for count, _ in fits])) if fits else np.inf
 
 
 def _counted(points: HeadPoints, grid: Grid) -> Iterator[np.ndarray]:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from built import centerline_of, cloud_of, network_of
 from rail_extract.core.heads.elevation import ElevationParameters, elevate
-from rail_extract.core.heads.head_points import near_lines
+from rail_extract.core.heads.head_points import judged, near_lines
 from rail_extract.core.heads.refinement import refine
 from rail_extract.core.heads.strips import (
     measure_strips,
@@ -72,8 +72,9 @@ def test_strips_over_the_same_place_are_offset_from_their_mean(third):
     np.testing.assert_allclose(found.standard_error(found.across, align=True), of_mean, atol=0.0015)
 
 
-def test_a_line_is_on_the_mean_of_overlapping_strips_however_dense_they_are():
-    points, line = scanned([(0.008, 0.006, 1.0, 3.0, 9000), (-0.008, -0.006, 0.5, 3.0, 3000)])
+@pytest.mark.parametrize(("across_m", "up_m"), [(0.008, 0.006), (0.015, -0.011)])
+def test_a_line_is_on_the_mean_of_overlapping_strips_however_dense_they_are(across_m, up_m):
+    points, line = scanned([(across_m, up_m, 1.0, 3.0, 9000), (-across_m, -up_m, 0.5, 3.0, 3000)])
     network = refine(network_of(line), points, HEAD_M)
     near = near_lines(network.lines, points.xyz, HEAD_M, points.strips)
     (one,) = elevate(network, near, 10, strips=[measure_strips(near[0])])
@@ -81,6 +82,19 @@ def test_a_line_is_on_the_mean_of_overlapping_strips_however_dense_they_are():
     assert np.abs(inner[:, 1:].mean(axis=0)).max() < 0.001
     assert np.abs(inner[:, 1:]).max() < 0.002
     assert one.sigma_mm > 7
+
+
+def test_each_strip_shows_whether_heads_are_blunt():
+    points, line = scanned([(-0.020, 0.011, 1.0, 3.0, 9000), (0.020, -0.011, 0.5, 3.0, 9000)])
+    assert judged(points, [line], HEAD_M).blunt is False
+    assert judged(replace(points, strips=None), [line], HEAD_M).blunt is True
+
+
+@pytest.mark.parametrize("off_m", [-0.012, 0.0, 0.012])
+def test_strips_far_apart_are_gathered_wherever_the_line_is(off_m):
+    points, line = scanned([(-0.015, 0.011, 1.0, 3.0, 9000), (0.015, -0.011, 0.5, 3.0, 9000)])
+    (found,) = strips_along([line + [0.0, off_m]], points)
+    assert found.gathered.all()
 
 
 def test_points_stay_where_strips_differ_because_each_sees_another_face():
