@@ -8,7 +8,7 @@ import numpy as np
 
 from .bed import COARSE_M, Bed, Coarse
 from .labels import Near
-from .lines import SINGLE_COVER, Lines, Marks, centred, find_lines
+from .lines import SINGLE_COVER, Ground, Lines, Marks, centred, find_lines
 from .partner import are_within_gauge, have_partners, runs_inside
 from .pieces import (
     LEAST_SINGLE_M,
@@ -176,8 +176,13 @@ def _on_middles(lines: Lines, found: Candidates, tolerances: Tolerances, setting
 def free_standing(found: Candidates, bed: Bed, reach_m: float, tolerances: Tolerances, settings: Settings) -> Kept:
     """Keep the candidates that lie on rails and stand free of what is beside them."""
     kept = on_lines(found, reach_m, tolerances, settings)
-    cant = np.einsum("ij,ij->i", bed.gradients(kept.lines.axis), kept.lines.across)
-    cant[np.abs(cant) > CANT] = 0.0
+    slope = bed.gradients(kept.lines.axis)
+    cant = np.einsum("ij,ij->i", slope, kept.lines.across)
+    steep = np.abs(cant) > CANT
+    cant[steep] = 0.0
+    if tolerances.band.shadows:
+        ground = Ground(found.tops.z.ravel()[kept.cell], np.where(steep[:, None], np.nan, slope))
+        kept = replace(kept, lines=replace(kept.lines, ground=ground))
     kept = kept.of(are_free(kept, found.tops, _depth_m(kept, tolerances), cant))
     kept = with_pairs(kept, settings, tolerances)
     alone = kept.of(~kept.paired)

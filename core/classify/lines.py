@@ -70,6 +70,21 @@ class Marks:
 
 
 @dataclass(frozen=True)
+class Ground:
+    """Tops of cells as such, `z`, (n,), and the slope of their beds to east and north, (n, 2); NaN: no track is so steep.
+
+    Heights are metres from any level, the same for all.
+    """
+
+    z: np.ndarray
+    slope: np.ndarray
+
+    def of(self, chosen: np.ndarray) -> Ground:
+        """Choose some of the cells."""
+        return Ground(self.z[chosen], self.slope[chosen])
+
+
+@dataclass(frozen=True)
 class Lines:
     """The line through each cell.
 
@@ -85,6 +100,8 @@ class Lines:
         Share of the parts of the line within reach that hold a cell.
     pure : (n,) array
         Share of the cells on the line among those on it and beside it: 0.07 to 0.12 in random surroundings.
+    ground : Ground, optional
+        What tells how high a line is above the bed of another one.
     """
 
     axis: np.ndarray
@@ -93,6 +110,7 @@ class Lines:
     cover: np.ndarray
     pure: np.ndarray
     reach_m: float
+    ground: Ground | None = None
 
     @property
     def along(self) -> np.ndarray:
@@ -117,6 +135,7 @@ class Lines:
             self.cover[chosen],
             self.pure[chosen],
             self.reach_m,
+            None if self.ground is None else self.ground.of(chosen),
         )
 
 

@@ -54,7 +54,7 @@ MAJORITY = 0.5
 def have_partners(lines: Lines, spacings_m: Sequence[float], height_m: float, worse_m: float = np.inf) -> np.ndarray:
     """Return which cells belong to a pair of rails, (n,) bool, at the best of the distances of the two heads.
 
-    `height_m` is the largest difference in height above the bed; see `partners` for `worse_m`.
+    `height_m` is the largest difference in height above the bed of either; see `partners` for `worse_m`.
     """
     stations = [partners(lines, spacing_m, SPACING_M, height_m, worse_m)[0] for spacing_m in spacings_m]
     return np.max(stations, axis=0) >= MIN_STATIONS
@@ -82,7 +82,7 @@ def partners(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Find the partners of each cell's line on the better side: `spacing_m` away, give or take `tolerance_m`.
 
-    They differ by at most `height_m` in height above the bed. A rail has one partner: what is at gauge from one that
+    They differ by at most `height_m` in height above the bed of either. A rail has one partner: what is at gauge from one that
     has a partner on its other side, nearer to `spacing_m` by `worse_m`, has none. Returns, (n,) each, the number of
     stations with a partner, 0 to 5, the side, 1 if the partner is to the left and -1 to the right, and its mean
     distance, NaN without one.
@@ -131,12 +131,26 @@ def _partnered(
     other = near[own, rank]
     apart = np.einsum("ij,ij->i", lines.axis[other] - lines.axis[own], lines.across[own])
     fits = np.abs(apart - left_m) < tolerance_m
-    fits &= np.abs(lines.height[other] - lines.height[own]) < height_m
+    fits &= _are_level(lines, own, other, height_m)
     fits &= _angle(lines.theta[other], lines.theta[own]) < ANGLE_RAD
     cell, found = np.zeros(len(lines.axis), dtype=np.int64), np.full(len(lines.axis), np.nan)
     # Written from the farthest to the nearest, the nearest one stays.
     cell[own[fits][::-1]], found[own[fits][::-1]] = other[fits][::-1], apart[fits][::-1]
     return cell, found
+
+
+def _are_level(lines: Lines, own: np.ndarray, other: np.ndarray, height_m: float) -> np.ndarray:
+    """Return which pairs of cells differ by less than `height_m` in height above their beds, or above the bed of one.
+
+    The head of a far rail may hide all of its own bed: what is lowest there is its foot or its face.
+    """
+    level = np.abs(lines.height[other] - lines.height[own]) < height_m
+    if lines.ground is None:
+        return level
+    step, rise = lines.axis[other] - lines.axis[own], lines.ground.z[other] - lines.ground.z[own]
+    for bed in (own, other):
+        level |= np.abs(rise - np.einsum("ij,ij->i", step, lines.ground.slope[bed])) < height_m
+    return level
 
 
 def runs_inside(

@@ -94,13 +94,13 @@ def _standing(shown: Shown, settings: Settings) -> Standing:
     """Find rails that stand out of their bed: bars as narrow as a head, or the ridges of a blunt cloud."""
     if settings.way is Way.FILLED:
         return on_low(shown, settings)
-    band = settings.tolerances(thin=False).band
-    found = Candidates.find(shown, band)
+    dense = settings.tolerances(thin=False)
+    found = Candidates.find(shown, dense.band)
     density = density_at(shown.bed.coarse, shown.tops.grid.middles(found.marks))
     thin = density < THIN_PER_M2
-    if thin and band.shadows:  # few points fill a strip by chance
-        found = Candidates.find(shown, replace(band, shadows=False))
     tolerances = settings.tolerances(thin)
+    if tolerances.band != dense.band:
+        found = Candidates.find(shown, tolerances.band)
     kept = free_standing(found, shown.bed, reach_at(density), tolerances, settings)
     if settings.blunt:
         return on_ridges(kept, thin, shown, settings)

@@ -123,6 +123,20 @@ def test_a_rail_beside_a_shoulder_has_its_partner():
     assert figures.paired_m > 0.9 * (figures.paired_m + figures.single_m) > 9
 
 
+def test_a_rail_of_a_canted_track_that_hides_all_of_its_bed_has_its_partner():
+    """Of one rail a low tripod shows the head alone, and of the ground next to nothing from there on."""
+    rng = np.random.RandomState(24)
+    xyz, on = with_track(flat(14.0, rng=rng, per_m2=6000), GAUGE, WIDTH, 0.3)
+    left = turned(xyz, 0.3)[1]
+    hidden = left < 0.5 - SPACING / 2
+    far = on & hidden
+    xyz[far, 2] -= rng.uniform(0.0, 0.08, far.sum())
+    xyz[:, 2] += 0.115 * left + rng.normal(0, 0.003, len(xyz))
+    xyz = xyz[~hidden | far]
+    figures = classify_square(xyz, SETTINGS).figures
+    assert figures.paired_m > 0.95 * (figures.paired_m + figures.single_m) > 20
+
+
 def test_rails_of_a_canted_track_in_ballast_up_to_the_heads_are_labelled():
     """On the higher side of each rail the bed rises to its top."""
     rng = np.random.RandomState(18)
