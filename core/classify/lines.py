@@ -71,9 +71,9 @@ class Marks:
 
 @dataclass(frozen=True)
 class Ground:
-    """Tops of cells as such, `z`, (n,), and the slope of their beds to east and north, (n, 2); NaN: no track is so steep.
+    """Heights of cells as such, `z`, (n,), and the slope of their beds to east and north, (n, 2).
 
-    Heights are metres from any level, the same for all.
+    Heights are metres from any level, the same for all; slopes are NaN where no track is so steep.
     """
 
     z: np.ndarray

@@ -82,10 +82,10 @@ def partners(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Find the partners of each cell's line on the better side: `spacing_m` away, give or take `tolerance_m`.
 
-    They differ by at most `height_m` in height above the bed of either. A rail has one partner: what is at gauge from one that
-    has a partner on its other side, nearer to `spacing_m` by `worse_m`, has none. Returns, (n,) each, the number of
-    stations with a partner, 0 to 5, the side, 1 if the partner is to the left and -1 to the right, and its mean
-    distance, NaN without one.
+    They differ by at most `height_m` in height above the bed of either. A rail has one partner: what is at gauge from
+    one that has a partner on its other side, nearer to `spacing_m` by `worse_m`, has none. Returns, (n,) each, the
+    number of stations with a partner, 0 to 5, the side, 1 if the partner is to the left and -1 to the right, and its
+    mean distance, NaN without one.
     """
     count = len(lines.axis)
     if count < 2:
