@@ -225,6 +225,8 @@ def measure_lines(
     spacings_m = [sum(gauge) for gauge in parameters.gauges]
     network = replace(network, lines=onto_heads(network.lines, points, heads, spacings_m))
     settings = parameters.smoothing_xy_m, refining, elevation.align, cell_m
+    if points.blunt:  # or so they look: two sharp passes that are apart make a ridge together
+        points = told_apart(points, network.lines, heads)
     network = refine(network, points, heads, *settings)
     told = told_apart(points, network.lines, heads)
     if told is not points:

@@ -343,6 +343,19 @@ def test_images_show_the_rails_where_the_scanner_does_not():
     assert float(said[0].split("a rail, on ")[1].split(" m")[0]) == pytest.approx(70, abs=2)
 
 
+def test_sharp_passes_that_look_blunt_together_are_told_apart_first():
+    """Two heads 4 cm aside and 2 cm apart in height look like a ridge, whose crest was 5 cm off."""
+    of = [
+        strips.Pass(side * 0.020, -side * 0.011, scanner=Scanner(noise_m=0.002, left_m=0.4 * side)) for side in (1, -1)
+    ]
+    scene = strips.passes("apart", 47, of, with_ids=False)
+    points = cloud_of(scene.xyz[scene.classification == scene.classification.max()])
+    network = extract_rails([points], Parameters(scene.standard.gauge_m, scene.standard.head_width_m, engine="OPENCV"))
+    back = match([network.frame.to_crs(rail.xyz) for rail in network.rails], scene.rails).back
+    assert len(network.rails) == 2
+    assert np.sqrt(np.mean(back.lateral**2)) < 0.002 and np.sqrt(np.mean(back.height**2)) < 0.001
+
+
 def test_passes_that_the_points_do_not_state_are_told_apart_by_levels():
     """Lines are on the mean of the passes; the log says it once, and the report has their offsets."""
     scene = strips.unmarked_heights()
