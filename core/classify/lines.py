@@ -101,7 +101,7 @@ class Lines:
     pure : (n,) array
         Share of the cells on the line among those on it and beside it: 0.07 to 0.12 in random surroundings.
     ground : Ground, optional
-        What tells how high a line is above the bed of another one.
+        Shows how high a line is above the bed of another one.
     """
 
     axis: np.ndarray
