@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -22,7 +23,7 @@ from .cells import (
 )
 from .labels import Near, label, whole_heads
 from .lines import Marks
-from .partner import MAJORITY, runs_inside
+from .partner import MAJORITY, SPACING_M, rise_above, runs_inside
 from .pieces import LEAST_SINGLE_M, lengths, mean_of, pieces_of, with_partner
 from .ridges import Ridges
 from .settings import Settings, Tolerances
@@ -38,6 +39,10 @@ Guard rails stand as high as the rail that they guard, or up to 20 mm higher."""
 GUARD_SHORTER_M = 2.0
 """Least difference in length of a guard rail and the rail that it guards: it ends a metre before it on both sides. Two
 lone rails that are as long as each other are both rails, as where one of each of two tracks is hidden."""
+
+THIRD_RAIL_M, HIGHER_M = 0.5, 0.04
+"""Distance outside of a track within which its third rail is, and least height of this above the rails. Third rails are
+0.3 to 0.45 m from a rail and 50 to 80 mm higher; a rail of another track that is as near is as high as they are."""
 
 SINGLE_WIDTH = 0.2
 """Least width of a rail without a partner by that of a head. A single profile of the scanner is a bar of no width where
@@ -164,12 +169,19 @@ def _are_rails(kept: Kept, beside: Near, shown: Shown, settings: Settings, toler
 
 
 def _are_guards(kept: Kept, piece: np.ndarray, partnered: np.ndarray, settings: Settings) -> np.ndarray:
-    """Return which pieces run along a longer one, or one with a partner, that is as high, within a gauge, (pieces,).
+    """Return which pieces are guard or third rails of a longer one, or of one with a partner, (pieces,) bool.
 
-    A guard rail ends before the rail that it guards, and hides it from a scanner beside the track.
+    A guard rail is as high as the rail within a gauge that it guards; it ends before that, and hides it from a scanner
+    beside the track. So does a third rail, which is higher and outside of the track.
     """
-    length_m = np.where(partnered, np.inf, lengths(kept.lines.axis, piece)[piece])
-    inside = runs_inside(
-        kept.lines, length_m, kept.pairs, settings.gauges_m, settings.head_width_m, AS_HIGH_M, GUARD_SHORTER_M
-    )
-    return mean_of(inside, piece) > MAJORITY
+    lines = kept.lines
+    length_m = np.where(partnered, np.inf, lengths(lines.axis, piece)[piece])
+
+    def inside(beyond_m: float, fits: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> np.ndarray:
+        return runs_inside(
+            lines, length_m, kept.pairs, settings.gauges_m, settings.head_width_m, beyond_m, GUARD_SHORTER_M, fits
+        )
+
+    guards = inside(SPACING_M, lambda own, rail: np.abs(lines.height[own] - lines.height[rail]) < AS_HIGH_M)
+    thirds = inside(THIRD_RAIL_M, lambda own, rail: rise_above(lines, rail, own, rail) > HIGHER_M)
+    return (mean_of(guards, piece) > MAJORITY) | (mean_of(thirds, piece) > MAJORITY)

@@ -6,7 +6,7 @@ rail that has. So do kerbs and shoulders that are at this distance from the near
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from scipy.ndimage import median
@@ -145,12 +145,17 @@ def _are_level(lines: Lines, own: np.ndarray, other: np.ndarray, height_m: float
     The head of a far rail may hide all of its own bed: what is lowest there is its foot or its face.
     """
     level = np.abs(lines.height[other] - lines.height[own]) < height_m
-    if lines.ground is None:
-        return level
-    step, rise = lines.axis[other] - lines.axis[own], lines.ground.z[other] - lines.ground.z[own]
     for bed in (own, other):
-        level |= np.abs(rise - np.einsum("ij,ij->i", step, lines.ground.slope[bed])) < height_m
+        level |= np.abs(rise_above(lines, own, other, bed)) < height_m
     return level
+
+
+def rise_above(lines: Lines, own: np.ndarray, other: np.ndarray, bed: np.ndarray) -> np.ndarray:
+    """How much higher above the bed of a cell other ones are than some, (k,) metres; NaN on the bed of no track."""
+    if lines.ground is None:
+        return np.full(len(own), np.nan)
+    step, rise = lines.axis[other] - lines.axis[own], lines.ground.z[other] - lines.ground.z[own]
+    return rise - np.einsum("ij,ij->i", step, lines.ground.slope[bed])
 
 
 def runs_inside(
@@ -159,13 +164,15 @@ def runs_inside(
     links: np.ndarray,
     gauges_m: Sequence[float],
     head_width_m: float,
-    height_m: float = np.inf,
+    beyond_m: float = SPACING_M,
     more: float = 0.0,
+    fits: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None,
 ) -> np.ndarray:
-    """Return which cells belong to something that runs along what is rather a rail, at gauge or nearer, (n,) bool.
+    """Return which cells belong to something that runs along what is rather a rail, nearer than a track, (n,) bool.
 
-    That has a `rank`, (n,), higher by `more`, and differs by less than `height_m` in height above the bed; `links`,
-    (m, 2), are pairs of cells on one line.
+    That has a `rank`, (n,), higher by `more`, and is at most `beyond_m` further away than the other rail of its track;
+    `links`, (m, 2), are pairs of cells on one line, and `fits` says which cells and cells of such a rail, (k,) numbers
+    each, may be such a pair.
     """
     inside = np.zeros(len(lines.axis), dtype=bool)
     if not len(rank):
@@ -173,7 +180,7 @@ def runs_inside(
     single, rails = np.flatnonzero(rank < rank.max()), np.flatnonzero(rank > rank.min())
     if not len(single) or not len(rails):
         return inside
-    too_far_m = max(gauges_m) + head_width_m + SPACING_M
+    too_far_m = max(gauges_m) + head_width_m + beyond_m
     reach_m = np.hypot(too_far_m, LEVEL_WITH_M)
     near = cKDTree(lines.axis[single]).sparse_distance_matrix(
         cKDTree(lines.axis[rails]), reach_m, output_type="ndarray"
@@ -184,7 +191,9 @@ def runs_inside(
     ahead = np.abs(np.einsum("ij,ij->i", step, lines.along[rail]))
     beside = (left > head_width_m + INSIDE_M) & (left < too_far_m) & (ahead < LEVEL_WITH_M)
     beside &= _angle(lines.theta[own], lines.theta[rail]) < PARALLEL_RAD
-    beside &= (rank[own] + more < rank[rail]) & (np.abs(lines.height[own] - lines.height[rail]) < height_m)
+    beside &= rank[own] + more < rank[rail]
+    if fits is not None:
+        beside &= fits(own, rail)
     inside[own[beside]] = True
     return _majority(inside, links)
 

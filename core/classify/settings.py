@@ -55,7 +55,8 @@ class Tolerances:
         Tops that may be those of rails.
     wider_m, wider_single_m : float
         Width beyond that of a head up to which the top of a piece may be one, with a partner and without. Measured
-        with a partner: up to 17 mm, and 41 mm on thin clouds; kerbs of 150 mm 62 mm, on thin clouds 59 mm.
+        with a partner: up to 17 mm, 26 mm in two passes of a scanner 3 cm apart, and 41 mm on thin clouds;
+        kerbs of 150 mm 62 mm, on thin clouds 59 mm.
     """
 
     along_m: float
@@ -93,7 +94,7 @@ DENSE = Tolerances(
     beside_m=0.02,
     least_m=LEAST_M,
     band=HEADS,
-    wider_m=0.025,
+    wider_m=0.040,
     wider_single_m=0.012,
 )
 """For scanners on vehicles: beams of a few millimetres, range noise up to 5 mm."""
@@ -123,9 +124,9 @@ something else by chance. Beside its crest, the ridge falls by up to 5 cm; noise
 limit that cut the lower side off would move the line, and one near the mean of the tops would lower it."""
 
 
-FILLED = replace(DENSE, least_m=BLUNT.least_m)
+FILLED = replace(DENSE, least_m=BLUNT.least_m, wider_m=0.025)
 """For heads just above the ballast that a track is filled with: as in blunt clouds, up to 4 m of something are at gauge
-from something else by chance."""
+from something else by chance. Boards are hardly wider than heads that passes show apart."""
 
 
 class Way(Enum):

@@ -230,6 +230,32 @@ def test_a_lone_bar_overhangs_if_it_is_a_rail(behind_m, kept):
     assert classify_square(np.concatenate([rough(xyz, rng), face]), SETTINGS).rail.any() == kept
 
 
+@pytest.mark.parametrize(("higher_m", "kept"), [(0.07, False), (0.0, True)])
+def test_what_hides_a_rail_and_is_higher_just_outside_its_track_is_a_third_rail(higher_m, kept):
+    """Neither bar has a partner; bars that are as high may be rails of two tracks."""
+    rng = np.random.RandomState(21)
+    xyz, rail = with_bar(flat(12.0, rng=rng, per_m2=2500), WIDTH, 0.0, -SPACING / 2)
+    place_m = SPACING / 2 + 0.36
+    xyz, third = with_bar(xyz, WIDTH, 0.0, place_m, TOP_M + higher_m, length_m=8.0)
+    left = turned(xyz, 0.0)[1]
+    seen = (left < place_m - 0.75) | (np.abs(left - place_m) < 0.3)
+    found = classify_square(rough(xyz, rng)[seen], SETTINGS).rail
+    assert found[rail[seen]].mean() > 0.9
+    assert found[third[seen]].any() == kept
+
+
+def test_heads_in_two_passes_that_are_3_cm_apart_are_labelled():
+    """Kerbs of 150 mm are far wider than both together."""
+    passes = []
+    for shift_m in (-0.015, 0.015):
+        xyz, on = ballasted(np.random.RandomState(5), 0.0)
+        passes.append((xyz + [0.0, shift_m, 0.0], on))
+    xyz, on = (np.concatenate(both) for both in zip(*passes))
+    found = classify_square(xyz, SETTINGS)
+    assert found.rail[on & inner(xyz, 8)].mean() > 0.9
+    assert found.figures.paired_m > 10
+
+
 def test_feet_and_webs_are_not_labelled():
     rng = np.random.RandomState(6)
     ground = flat(6.0, rng=rng, per_m2=3000)
