@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 from ..lines.ends import STEP_M, even_points, tip_and_direction
 from ..lines.network import LineNetwork
 from ..polyline import runs
-from .junctions import DIRECTION_M
+from .junctions import DIRECTION_M, weld_pairs
 
 CLEAR_M = (8.0, 11.0, 14.0)
 """Distances from the middle of a slip from which its legs are taken for those of the crossing, tried in this order."""
@@ -55,8 +55,8 @@ SIDE_M = 0.15
 ENTRY_M = 1.0
 """Length within which a leg is cut at the border of a slip."""
 
-MIN_RADIUS_M, MAX_RADIUS_M = 80.0, 700.0
-"""Radii of slip curves: 190 and 215 m are usual, 100 m in old yards, 500 m at 1:14."""
+MIN_RADIUS_M = 80.0
+"""Least radius of a slip curve: 190 and 215 m are usual, 100 m in old yards, 500 m at 1:14."""
 
 SEPARATE_M, MIN_SEEN_M = 0.11, 5.0
 """Distance between the axes of a slip curve and of the rails that cross from which there is a cell between their heads,
@@ -106,11 +106,12 @@ class _Cross:
         along = (first + second) / np.hypot(*(first + second))
         return cls(place, np.array([along, [-along[1], along[0]]]), half_angle)
 
-    def height_of_curve(self, cells: np.ndarray, side: float) -> float | None:
+    def height_of_curve(self, cells: np.ndarray, side: float, longest_m: float) -> float | None:
         """Find the height of a curve that touches both lines above the crossing, 1 to the left of it, -1 to the right.
 
-        A curve of radius R passes e = R h² / 2 above a crossing of half angle h. At x it is y = e + x² h² / (4 e)
-        above it, so every cell, (n, 2), states an e. None if cells show no such curve.
+        A curve of radius R passes e = R h² / 2 above a crossing of half angle h, and touches the lines at R h = 2 e / h
+        from the middle, at most `longest_m`. At x it is y = e + x² h² / (4 e) above it, so every cell, (n, 2), states
+        an e. None if cells show no such curve.
         """
         x, y = self.axes @ (cells - self.place).T
         y = side * y
@@ -118,7 +119,7 @@ class _Cross:
         x, y = x[inside], y[inside]
         height = 0.5 * (y + np.sqrt(y**2 - (x * self.half_angle) ** 2))
         reach = self._seen_m(height) / 2
-        lowest, highest = (0.5 * radius * self.half_angle**2 for radius in (MIN_RADIUS_M, MAX_RADIUS_M))
+        lowest, highest = 0.5 * MIN_RADIUS_M * self.half_angle**2, 0.5 * longest_m * self.half_angle
         used = (np.abs(x) <= reach) & (height >= lowest) & (height <= highest)
         x, height = x[used], height[used]
         if not len(x):
@@ -159,30 +160,25 @@ class Slip:
     clear_m: float
     heights: tuple[tuple[float, float], ...]
 
-    @property
-    def tangent_m(self) -> float:
-        """Distance from the middle at which the longest curve touches the legs."""
-        return max(2 * height / self.cross.half_angle for height, _ in self.heights)
-
     def holds(self, places: np.ndarray) -> np.ndarray:
         """Return which places, (n, 2), are inside: between the legs and the curves, or on them."""
         x, y = self.cross.axes @ (places - self.cross.place).T
-        top = np.abs(x) * self.cross.half_angle + SIDE_M
+        low, top = (np.abs(x) * self.cross.half_angle + side_m for side_m in (-SIDE_M, SIDE_M))
         for height, side in self.heights:
             curved = height + (x * self.cross.half_angle) ** 2 / (4 * height) + SIDE_M
             top = np.where(side * y > 0, np.maximum(top, curved), top)
-        return (np.abs(x) < self.clear_m) & (np.abs(y) < top)
+        return (np.abs(x) < self.clear_m) & (np.abs(y) < top) & (np.abs(y) > low)
 
     def is_beside(self, other: Slip) -> bool:
         """Return whether another slip is that of the other two rails of the same two tracks."""
         x, y = self.cross.axes @ (other.cross.place - self.cross.place)
         return bool(abs(x) < SHIFT_M and SPACINGS_M[0] < abs(y) < SPACINGS_M[1])
 
-    def is_leg(self, place: np.ndarray) -> bool:
-        """Return whether a place is where a leg enters."""
+    def line_of_leg(self, place: np.ndarray) -> int | None:
+        """Return on which of the two lines, 0 or 1, a leg enters in a place; None if it does not."""
         x, y = self.cross.axes @ (place - self.cross.place)
         off_m = abs(abs(y) - abs(x) * self.cross.half_angle)
-        return bool(off_m < STRAY_M and abs(x) > self.clear_m - ENTRY_M)
+        return int(x * y > 0) if off_m < STRAY_M and abs(x) > self.clear_m - ENTRY_M else None
 
 
 def open_slips(network: LineNetwork, seen: cKDTree) -> tuple[LineNetwork, list[Slip]]:
@@ -293,10 +289,9 @@ def _slip(parts: _Parts, place: np.ndarray, seen: cKDTree) -> Slip | None:
         if cross is None:
             continue
         cells = seen.data[seen.query_ball_point(cross.place, clear_m)]
-        heights = [(cross.height_of_curve(cells, side), side) for side in (1.0, -1.0)]
-        slip = Slip(cross, clear_m, tuple((height, side) for height, side in heights if height is not None))
-        if slip.heights and clear_m >= CLEAR_SHARE * slip.tangent_m:
-            return slip
+        heights = [(cross.height_of_curve(cells, side, clear_m / CLEAR_SHARE), side) for side in (1.0, -1.0)]
+        if any(height is not None for height, _ in heights):
+            return Slip(cross, clear_m, tuple((height, side) for height, side in heights if height is not None))
     return None
 
 
@@ -319,11 +314,11 @@ def _continue(tips: np.ndarray, outward: np.ndarray) -> bool:
 
 
 def _as_crossing(network: LineNetwork, slip: Slip) -> LineNetwork:
-    """Remove what is inside a slip, and let its four legs meet in one node."""
-    hub = len(network.nodes)
+    """Remove what is inside a slip, and join its four legs as two straight lines that cross."""
+    middle = len(network.nodes)
     lines: list[np.ndarray] = []
     ends: list[tuple[int, int]] = []
-    nodes = [*network.nodes, slip.cross.place]
+    nodes = [*network.nodes, slip.cross.place, slip.cross.place]
     for line, own in zip(network.lines, network.ends.tolist()):
         outside = ~slip.holds(line)
         for first, last in runs(outside):
@@ -332,17 +327,18 @@ def _as_crossing(network: LineNetwork, slip: Slip) -> LineNetwork:
                 if not cut:
                     continue
                 tip = piece[-1 if side else 0]
-                if slip.is_leg(tip):
+                number = slip.line_of_leg(tip)
+                if number is not None:
                     way = even_points(np.array([slip.cross.place, tip]))[:-1]
                     piece = np.concatenate([piece, way[::-1]] if side else [way, piece])
-                    pair[side] = hub
+                    pair[side] = middle + number
                 else:
                     pair[side] = len(nodes)
                     nodes.append(tip)
             if len(piece) > 1:
                 lines.append(piece)
                 ends.append((pair[0], pair[1]))
-    return LineNetwork(tuple(lines), np.array(nodes), np.array(ends)).tidy()
+    return weld_pairs(LineNetwork(tuple(lines), np.array(nodes), np.array(ends)).tidy())
 
 
 def add_curves(network: LineNetwork, slips: Sequence[Slip]) -> LineNetwork:
