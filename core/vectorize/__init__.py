@@ -13,7 +13,7 @@ from ..parameters import Parameters
 from ..progress import SILENT, Progress
 from ..raster import RailRaster
 from .branches import attach_branches, choose_routes, part_branches
-from .courses import drop_wings, follow_courses
+from .courses import follow_courses
 from .junctions import clean_junctions, cut_bends, run_through, weld_pairs
 from .skeleton import chamfer_distance, close, parity_fix, pixel_set, prune, trace, veinerize
 from .slips import add_curves, open_slips
@@ -58,7 +58,7 @@ def vectorize(
     network, slips = open_slips(clean_junctions(traced, head_width_m), seen)
     network = cut_bends(network, progress.span(0.6, 0.7))
     network = follow_courses(network, seen, max_gap_m, gap_angle_deg, progress.span(0.7, 0.9))
-    network = drop_wings(run_through(part_branches(add_curves(network, slips))))
+    network = run_through(part_branches(add_curves(network, slips)))
     network = attach_branches(network, seen, max_gap_m, progress.span(0.9, 1.0))
     return _settle_ends(choose_routes(_drop_short(network, min_length_m)))
 

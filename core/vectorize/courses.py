@@ -40,9 +40,6 @@ CUTS_M = (0.0, SKIP_M, 1.0, 2.0, 3.0)
 """Lengths cut off both ends before they are joined. Weeds, guard rails and wing rails draw ends aside for up to 3 m,
 even until two ends overlap side by side."""
 
-WING_M = 3.0
-"""A line up to this length that ends freely beside a longer one is a wing rail, and is left out."""
-
 MISFIT_M = 0.015
 """Misfit allowed to the lines that a rail continues: wing rails widen them. The cost of a join contains the rest."""
 
@@ -51,7 +48,7 @@ MIN_PIECE_M = 0.3
 
 UNSEEN_M = 0.12
 """A place this far from all cells shows neither its rail, nor one that is merged with it, nor a check rail that hides
-it, whose head begins 0.10 m from the axis of the rail."""
+it, whose head begins 0.10 m from the axis of the rail. A line closer than this may be what shows the rail."""
 
 STEADY_M = 8.0
 """Length of line on either side of a join that is to be of one curvature."""
@@ -81,8 +78,8 @@ LINK_PER_M, STUB_PER_M, ALONE_PER_M = 0.5, 1.0, 2.0
 else explains. The shared part of two rails that cross at 1:9 costs as much as a join."""
 
 BESIDE_M, BESIDE_SHARE = 0.2, 0.7
-"""An unused link of which a larger share is this close to the joins that replace it is left out, and so is a wing rail
-beside a line. A check rail is 0.14 m from the axis of its rail."""
+"""An unused link of which a larger share is this close to the joins that replace it is left out. A check rail is 0.14 m
+from the axis of its rail."""
 
 
 def follow_courses(
@@ -116,9 +113,13 @@ class _Joins:
     ) -> None:
         self.network, self.seen = network, seen
         self.max_gap_m, self.slope = max_gap_m, float(np.tan(np.radians(gap_angle_deg)))
+        self.unseen_per_m = UNSEEN / max(max_gap_m, STEP_M)
         self.lengths = network.lengths()
         degrees = network.degrees()[network.ends].min(axis=1, initial=9)
         self.is_link = (degrees >= 2) & (self.lengths < MAX_MERGED_M)
+        parts = [even_points(line) for line in network.lines]
+        self.drawn = cKDTree(np.concatenate([np.empty((0, 2)), *parts]))
+        self.number = np.repeat(np.arange(len(parts)), [len(part) for part in parts])
         self.costs: dict[tuple[int, int], float] = {}
         self.bridges: dict[tuple[int, int], Bridge] = {}
         for one, other in self._near():
@@ -162,6 +163,7 @@ class _Joins:
             if curve is None:
                 continue
             cost = JOIN + CUT_PER_M * cut_m + self._cost((way, other_way), tips, curve)
+            cost += self._cost_of_others(curve, (one // 2, other // 2))
             if cost < (found[0] if found else 2 * FREE):
                 found = cost, replace(curve, cuts_m=(curve.cuts_m[0] + cut_m, curve.cuts_m[1] + cut_m))
         return found
@@ -185,7 +187,18 @@ class _Joins:
         own_m = np.abs(bends).max() * STEADY_M**2 / 36
         turn = float(np.sum(turns**2)) / np.radians(TURN_DEG) ** 2
         stray = unsteadiness(one, other, STEADY_M) ** 2 / (STRAY_M**2 + own_m**2)
-        return turn + stray + UNSEEN * gap_m / max(self.max_gap_m, STEP_M)
+        return turn + stray + self.unseen_per_m * gap_m
+
+    def _cost_of_others(self, curve: Bridge, own: tuple[int, int]) -> float:
+        """Return what the other lines along a curve say about it: those of other rails do not show one, links do.
+
+        A link that is left out explains nothing, but two rails that cross explain it: each saves half its cost.
+        """
+        near_m, nearest = self.drawn.query(curve.points) if len(curve.points) else (np.empty(0), np.empty(0, dtype=int))
+        other = self.number[nearest][near_m < UNSEEN_M]
+        other = other[~np.isin(other, own)]
+        per_m = np.where(self.is_link[other], -0.5 * LINK_PER_M, self.unseen_per_m)
+        return STEP_M * float(per_m.sum())
 
     def chosen(self) -> list[tuple[int, int]]:
         """List the joins that together cost least."""
@@ -212,18 +225,6 @@ def _joined(network: LineNetwork, joins: _Joins) -> tuple[LineNetwork, bool]:
     return weld_pairs(network.bridged(bridges, {}, _replaced(network, bridges, unused)), KINK_DEG), True
 
 
-def drop_wings(network: LineNetwork) -> LineNetwork:
-    """Drop lines of up to `WING_M` with a free end that run beside longer ones."""
-    is_short = network.lengths() < WING_M
-    ends_freely = (network.degrees()[network.ends] == 1).any(axis=1)
-    points = [even_points(line) for line, short in zip(network.lines, is_short) if not short]
-    longer = cKDTree(np.concatenate([np.empty((0, 2)), *points]))
-    keep = np.ones(len(network.lines), dtype=bool)
-    for number in np.flatnonzero(is_short & ends_freely).tolist():
-        keep[number] = not _is_beside(network.lines[number], longer)
-    return weld_pairs(network.select(keep), KINK_DEG)
-
-
 def _apart(bridges: Mapping[tuple[int, int], Bridge], joins: _Joins) -> dict[tuple[int, int], Bridge]:
     """Leave out bridges for which, with a cheaper one at the other end, more is cut off a piece than there is.
 
@@ -240,7 +241,11 @@ def _apart(bridges: Mapping[tuple[int, int], Bridge], joins: _Joins) -> dict[tup
 def _replaced(network: LineNetwork, bridges: Mapping[tuple[int, int], Bridge], unused: Collection[int]) -> list[int]:
     """List the unused links that run beside bridges."""
     drawn = cKDTree(np.concatenate([np.empty((0, 2)), *(curve.points for curve in bridges.values())]))
-    return [number for number in unused if _is_beside(network.lines[number], drawn)]
+    return [
+        number
+        for number in unused
+        if np.mean(drawn.query(even_points(network.lines[number]))[0] < BESIDE_M) > BESIDE_SHARE
+    ]
 
 
 def _branching(
@@ -315,11 +320,6 @@ def _pairs_along(ring: Sequence[int], gains: Mapping[tuple[int, int], float]) ->
 def unseen_m(points: np.ndarray, seen: cKDTree) -> float:
     """Measure the length of a curve away from all cells, given its points, one every `STEP_M`."""
     return STEP_M * np.count_nonzero(seen.query(points)[0] > UNSEEN_M) if len(points) else 0.0
-
-
-def _is_beside(line: np.ndarray, drawn: cKDTree) -> bool:
-    """Return whether most of a line is so close to other lines that these explain it, given their points."""
-    return bool(drawn.n) and float(np.mean(drawn.query(even_points(line))[0] < BESIDE_M)) > BESIDE_SHARE
 
 
 def _points_along(outward: np.ndarray, way: np.ndarray, slope: float, further_m: float = 0.0) -> np.ndarray:
