@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from rail_extract.core.lines.ends import even_points
 from rail_extract.core.lines.network import LineNetwork
 from rail_extract.core.parameters import Parameters
 from rail_extract.core.polyline import Polyline, project
@@ -27,7 +28,7 @@ def leg(side, slope, first_m, aside_m=0.0, aside_length_m=3.0):
 def network(legs, links, nodes):
     """Join legs, each with the node that it begins in, and links between two nodes."""
     lines = [np.concatenate([[nodes[node]], line]) for node, line in legs]
-    lines += [np.array([nodes[one], middle, nodes[other]], dtype=float) for one, middle, other in links]
+    lines += [np.vstack([nodes[one], middle, nodes[other]]).astype(float) for one, middle, other in links]
     tips = [line[-1] for _, line in legs]
     ends = [(node, len(nodes) + number) for number, (node, _) in enumerate(legs)]
     ends += [(one, other) for one, _, other in links]
@@ -78,6 +79,22 @@ def test_a_frog_of_several_nodes_is_one_crossing():
     legs = [(0, leg(-1, SLOPE, 0.8)), (0, leg(-1, -SLOPE, 0.8)), (1, leg(1, SLOPE, 0.8)), (2, leg(1, -SLOPE, 1.7))]
     links = [(0, (0.0, 0.12), 1), (0, (0.0, -0.06), 1)]
     check_that_two_rails_cross(resolved(network(legs, links, nodes)))
+
+
+@pytest.mark.parametrize(("number", "half_m", "aside_m"), [(12, 4.0, 0.08), (20, 4.0, 0.08), (24, 5.0, 0.06)])
+def test_two_rails_that_share_a_long_way_with_bends_cross(number, half_m, aside_m):
+    slope = 0.5 / number
+    nodes = [(-half_m, 0.0), (-half_m / 3, aside_m), (half_m / 3, -aside_m), (half_m, 0.0)]
+    legs = [(node, leg(side, way, half_m + 0.2)) for node, side in ((0, -1), (3, 1)) for way in (slope, -slope)]
+    links = [
+        (one, even_points(np.array([nodes[one], middle, nodes[one + 1]]))[1:-1], one + 1)
+        for one, middle in enumerate([(-2 * half_m / 3, aside_m), (0.0, 0.0), (2 * half_m / 3, -aside_m)])
+    ]
+    found = resolved(network(legs, links, nodes))
+    assert len(found.lines) == 2
+    for line in found.lines:
+        assert np.abs(line[:, 1]).min() < 0.01 < 0.8 * slope * 25 < np.abs(line[[0, -1], 1]).min()
+        assert line[0, 1] * line[-1, 1] < 0
 
 
 def beside(through, first, last):
