@@ -73,7 +73,7 @@ class Marks:
 class Ground:
     """Heights of cells as such, `z`, (n,), and the slope of their beds to east and north, (n, 2).
 
-    Heights are metres from any level, the same for all; slopes are NaN where no track is so steep.
+    Heights are metres from any level, the same for all; slopes are NaN where the bed is steeper than any track.
     """
 
     z: np.ndarray

@@ -151,7 +151,7 @@ def _are_level(lines: Lines, own: np.ndarray, other: np.ndarray, height_m: float
 
 
 def rise_above(lines: Lines, own: np.ndarray, other: np.ndarray, bed: np.ndarray) -> np.ndarray:
-    """How much higher above the bed of a cell other ones are than some, (k,) metres; NaN on the bed of no track."""
+    """By how much cells `other` are higher than cells `own`, above the bed of cells `bed`, (k,) metres, or NaN."""
     if lines.ground is None:
         return np.full(len(own), np.nan)
     step, rise = lines.axis[other] - lines.axis[own], lines.ground.z[other] - lines.ground.z[own]

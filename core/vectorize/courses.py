@@ -48,7 +48,7 @@ MIN_PIECE_M = 0.3
 
 UNSEEN_M = 0.12
 """A place this far from all cells shows neither its rail, nor one that is merged with it, nor a check rail that hides
-it, whose head begins 0.10 m from the axis of the rail. A line closer than this may be what shows the rail."""
+it, whose head begins 0.10 m from the axis of the rail. A link closer than this may be what shows the rail."""
 
 STEADY_M = 8.0
 """Length of line on either side of a join that is to be of one curvature."""
@@ -113,7 +113,6 @@ class _Joins:
     ) -> None:
         self.network, self.seen = network, seen
         self.max_gap_m, self.slope = max_gap_m, float(np.tan(np.radians(gap_angle_deg)))
-        self.unseen_per_m = UNSEEN / max(max_gap_m, STEP_M)
         self.lengths = network.lengths()
         degrees = network.degrees()[network.ends].min(axis=1, initial=9)
         self.is_link = (degrees >= 2) & (self.lengths < MAX_MERGED_M)
@@ -163,7 +162,7 @@ class _Joins:
             if curve is None:
                 continue
             cost = JOIN + CUT_PER_M * cut_m + self._cost((way, other_way), tips, curve)
-            cost += self._cost_of_others(curve, (one // 2, other // 2))
+            cost -= self._saved(curve, (one // 2, other // 2))
             if cost < (found[0] if found else 2 * FREE):
                 found = cost, replace(curve, cuts_m=(curve.cuts_m[0] + cut_m, curve.cuts_m[1] + cut_m))
         return found
@@ -187,18 +186,19 @@ class _Joins:
         own_m = np.abs(bends).max() * STEADY_M**2 / 36
         turn = float(np.sum(turns**2)) / np.radians(TURN_DEG) ** 2
         stray = unsteadiness(one, other, STEADY_M) ** 2 / (STRAY_M**2 + own_m**2)
-        return turn + stray + self.unseen_per_m * gap_m
+        return turn + stray + UNSEEN * gap_m / max(self.max_gap_m, STEP_M)
 
-    def _cost_of_others(self, curve: Bridge, own: tuple[int, int]) -> float:
-        """Return what the other lines along a curve say about it: those of other rails do not show one, links do.
+    def _saved(self, curve: Bridge, own: tuple[int, int]) -> float:
+        """Return what a bridge between two lines saves by running along links, which it explains.
 
-        A link that is left out explains nothing, but two rails that cross explain it: each saves half its cost.
+        A link that is left out costs something because nothing explains it. Two rails that cross do, half of it each.
         """
-        near_m, nearest = self.drawn.query(curve.points) if len(curve.points) else (np.empty(0), np.empty(0, dtype=int))
-        other = self.number[nearest][near_m < UNSEEN_M]
-        other = other[~np.isin(other, own)]
-        per_m = np.where(self.is_link[other], -0.5 * LINK_PER_M, self.unseen_per_m)
-        return STEP_M * float(per_m.sum())
+        if not len(curve.points):
+            return 0.0
+        near_m, nearest = self.drawn.query(curve.points)
+        number = self.number[nearest]
+        explained = (near_m < UNSEEN_M) & self.is_link[number] & ~np.isin(number, own)
+        return 0.5 * LINK_PER_M * STEP_M * np.count_nonzero(explained)
 
     def chosen(self) -> list[tuple[int, int]]:
         """List the joins that together cost least."""

@@ -52,11 +52,8 @@ MIN_LEG_SHARE = 0.6
 SIDE_M = 0.15
 """Width beside the outer rails of a slip from which lines are removed: they stray by the width of merged rails."""
 
-ENTRY_M = 1.0
-"""Length within which a leg is cut at the border of a slip."""
-
 MIN_RADIUS_M = 80.0
-"""Least radius of a slip curve: 190 and 215 m are usual, 100 m in old yards, 500 m at 1:14."""
+"""Least radius of a slip curve: 190 and 215 m are usual, 100 m in old yards."""
 
 SEPARATE_M, MIN_SEEN_M = 0.11, 5.0
 """Distance between the axes of a slip curve and of the rails that cross from which there is a cell between their heads,
@@ -120,7 +117,8 @@ class _Cross:
         height = 0.5 * (y + np.sqrt(y**2 - (x * self.half_angle) ** 2))
         reach = self._seen_m(height) / 2
         lowest, highest = 0.5 * MIN_RADIUS_M * self.half_angle**2, 0.5 * longest_m * self.half_angle
-        used = (np.abs(x) <= reach) & (height >= lowest) & (height <= highest)
+        # The lower half of a head would show a curve that is too low, so all of the highest one is looked at.
+        used = (np.abs(x) <= reach) & (height >= lowest) & (height <= highest + 2 * HALF_HEAD_M)
         x, height = x[used], height[used]
         if not len(x):
             return None
@@ -129,6 +127,8 @@ class _Cross:
         mode = (np.argmax(np.convolve(counts, np.ones(width), "same")) + 0.5) * BIN_M
         on_head = np.abs(height - mode) <= HALF_HEAD_M
         found = float(np.median(height[on_head]))
+        if found > highest:
+            return None
         length = float(self._seen_m(found))
         covered = np.unique(np.floor(x[np.abs(height - found) <= HALF_HEAD_M] / COVER_M))
         return found if length >= MIN_SEEN_M and len(covered) >= MIN_COVERED * length / COVER_M else None
@@ -174,18 +174,25 @@ class Slip:
         x, y = self.cross.axes @ (other.cross.place - self.cross.place)
         return bool(abs(x) < SHIFT_M and SPACINGS_M[0] < abs(y) < SPACINGS_M[1])
 
-    def line_of_leg(self, place: np.ndarray) -> int | None:
-        """Return on which of the two lines, 0 or 1, a leg enters in a place; None if it does not."""
-        x, y = self.cross.axes @ (place - self.cross.place)
+    def line_of_leg(self, way: np.ndarray) -> int | None:
+        """Return on which of the two lines, 0 or 1, a way, (n, 2), given from the border of the slip, is a leg.
+
+        None if it is on neither. The rails of the other crossing may reach the border as well, but at the opposite
+        angle.
+        """
+        x, y = self.cross.axes @ (way[0] - self.cross.place)
+        ahead, aside = self.cross.axes @ tip_and_direction(even_points(way, DIRECTION_M))[1]
+        slope = np.sign(x * y) * self.cross.half_angle
+        turns = abs(aside - slope * ahead) > self.cross.half_angle * abs(ahead)
         off_m = abs(abs(y) - abs(x) * self.cross.half_angle)
-        return int(x * y > 0) if off_m < STRAY_M and abs(x) > self.clear_m - ENTRY_M else None
+        return None if turns or off_m > STRAY_M else int(x * y > 0)
 
 
 def open_slips(network: LineNetwork, seen: cKDTree) -> tuple[LineNetwork, list[Slip]]:
-    """Draw the crossings inside slips as four straight legs that meet in one node, and find the slip curves.
+    """Draw the crossings inside slips as two straight lines that cross, and find the slip curves.
 
     The lines have no passes, and `seen` holds the places of rail cells. The slips are what `add_curves` adds once the
-    crossings are resolved.
+    joins have been chosen.
     """
     slips = _paired(_find(network, seen))
     for slip in slips:
@@ -327,7 +334,7 @@ def _as_crossing(network: LineNetwork, slip: Slip) -> LineNetwork:
                 if not cut:
                     continue
                 tip = piece[-1 if side else 0]
-                number = slip.line_of_leg(tip)
+                number = slip.line_of_leg(piece[::-1] if side else piece)
                 if number is not None:
                     way = even_points(np.array([slip.cross.place, tip]))[:-1]
                     piece = np.concatenate([piece, way[::-1]] if side else [way, piece])
@@ -342,7 +349,7 @@ def _as_crossing(network: LineNetwork, slip: Slip) -> LineNetwork:
 
 
 def add_curves(network: LineNetwork, slips: Sequence[Slip]) -> LineNetwork:
-    """Add the curves of slips, which begin and end on the lines that they touch, where the crossing was resolved."""
+    """Add the curves of slips, which begin and end on the lines that they touch, where two lines still cross."""
     for slip in slips:
         near = [np.hypot(*(line - slip.cross.place).T) for line in network.lines]
         through = [n for n, one in enumerate(near) if one.min() < STRAY_M and 0 < one.argmin() < len(one) - 1]

@@ -2,29 +2,36 @@
 
 import numpy as np
 import pytest
+from rail_extract.core.lines.ends import even_points
 from rail_extract.core.lines.network import LineNetwork
 from rail_extract.core.vectorize.courses import follow_courses
 from rail_extract.core.vectorize.slips import add_curves, open_slips
 from scipy.spatial import cKDTree
 
 SPACING_M, LENGTH_M = 1.507, 25.0
+CELL_M, HALF_HEAD_M = 0.04, 0.036
 
 
-def lines_beside_a_slip(number=9.0, radius_m=190.0):
+def lines_beside_a_slip(number=9.0, radius_m=190.0, spacing_m=SPACING_M):
     """Lines of both rails as flangeways leave them: one runs along the upper legs, one along the curve, no node."""
     x = np.arange(-LENGTH_M, LENGTH_M + 0.05, 0.1)
     half_angle = 0.5 * np.arctan(1 / number)
     legs = np.abs(x) * np.tan(half_angle)
     above_m = radius_m * half_angle**2 / 2
     curve = np.where(np.abs(x) < 2 * above_m / half_angle, above_m + (x * half_angle) ** 2 / (4 * above_m), legs)
-    return [np.column_stack([x, y + up]) for up in (0.0, SPACING_M) for y in (legs, -curve)]
+    return [np.column_stack([x, y + up]) for up in (0.0, spacing_m) for y in (legs, -curve)]
+
+
+def cells_of(lines):
+    """Places of the cells of heads along lines."""
+    heads = [line + [0.0, aside] for line in map(even_points, lines) for aside in np.linspace(-1, 1, 9) * HALF_HEAD_M]
+    return cKDTree(CELL_M * np.unique(np.round(np.concatenate(heads) / CELL_M), axis=0))
 
 
 def opened(lines):
     ends = np.arange(2 * len(lines)).reshape(-1, 2)
     nodes = np.concatenate([line[[0, -1]] for line in lines])
-    seen = cKDTree(np.concatenate(lines))
-    return open_slips(LineNetwork(tuple(lines), nodes, ends), seen)
+    return open_slips(LineNetwork(tuple(lines), nodes, ends), cells_of(lines))
 
 
 @pytest.mark.parametrize(("number", "radius_m"), [(9.0, 190.0), (6.6, 117.0)])
@@ -49,13 +56,25 @@ def test_lines_that_come_close_and_part_again_are_left_as_they_are():
     assert len(network.lines) == 4
 
 
-def test_a_rail_that_crosses_a_leg_of_a_slip_stays_whole():
-    y = 0.1 * np.arange(-100, 101)
-    crossing = np.column_stack([9.0 + 0.0 * y, y])
-    network, slips = opened([*lines_beside_a_slip(), crossing])
-    assert len(slips) == 2
-    legs = [line for line in network.lines if np.ptp(line[:, 0]) > LENGTH_M]
-    assert sorted(round(np.ptp(line[:, 0])) for line in legs) == [2 * LENGTH_M] * 4
-    seen = cKDTree(np.concatenate([*lines_beside_a_slip(), crossing]))
-    drawn = follow_courses(network, seen, 5.0, 10.0).lines
-    assert any(np.ptp(line[:, 1]) > 19.9 and np.ptp(line[:, 0]) < 0.1 for line in drawn)
+@pytest.mark.parametrize(("number", "radius_m"), [(9.0, 190.0), (9.0, 215.0), (9.0, 230.0), (14.0, 500.0)])
+def test_a_slip_curve_passes_the_crossing_as_its_radius_says(number, radius_m):
+    _, slips = opened(lines_beside_a_slip(number, radius_m))
+    heights = [height for slip in slips for height, _ in slip.heights]
+    expected = radius_m * (0.5 * np.arctan(1 / number)) ** 2 / 2
+    np.testing.assert_allclose(heights, [expected] * 2, atol=0.03)
+
+
+@pytest.mark.parametrize(("number", "spacing_m"), [(5.3, SPACING_M), (7.5, 1.07), (8.25, 1.07)])
+def test_legs_of_the_other_crossing_are_not_taken_for_those_of_a_slip(number, spacing_m):
+    lines = lines_beside_a_slip(number, 100.0, spacing_m)
+    network, slips = opened(lines)
+    drawn = add_curves(follow_courses(network, cells_of(lines), 5.0, 10.0), slips).lines
+    assert sorted(round(np.ptp(line[:, 0])) for line in drawn if np.ptp(line[:, 0]) > 20) == [2 * LENGTH_M] * 4
+
+
+def test_rails_between_the_legs_of_a_slip_stay():
+    x = 0.1 * np.arange(60, 101)
+    between = np.column_stack([x, 0.0 * x])
+    network, slips = opened([*lines_beside_a_slip(9.0, 230.0), between])
+    assert [slip.clear_m for slip in slips] == [11.0, 11.0]
+    assert any(np.array_equal(line, between) for line in network.lines)
