@@ -162,7 +162,6 @@ class _Joins:
             if curve is None:
                 continue
             cost = JOIN + CUT_PER_M * cut_m + self._cost((way, other_way), tips, curve)
-            cost -= self._saved(curve, (one // 2, other // 2))
             if cost < (found[0] if found else 2 * FREE):
                 found = cost, replace(curve, cuts_m=(curve.cuts_m[0] + cut_m, curve.cuts_m[1] + cut_m))
         return found
@@ -188,24 +187,28 @@ class _Joins:
         stray = unsteadiness(one, other, STEADY_M) ** 2 / (STRAY_M**2 + own_m**2)
         return turn + stray + UNSEEN * gap_m / max(self.max_gap_m, STEP_M)
 
-    def _saved(self, curve: Bridge, own: tuple[int, int]) -> float:
-        """Return what a bridge between two lines saves by running along links, which it explains.
+    def _saved(self, ends: tuple[int, int]) -> float:
+        """Return what the bridge between two ends saves by running along links, which it explains.
 
         A link that is left out costs something because nothing explains it. Two rails that cross do, half of it each.
         """
-        if not len(curve.points):
+        points = self.bridges[ends].points
+        if not len(points):
             return 0.0
-        near_m, nearest = self.drawn.query(curve.points)
+        near_m, nearest = self.drawn.query(points)
         number = self.number[nearest]
-        explained = (near_m < UNSEEN_M) & self.is_link[number] & ~np.isin(number, own)
-        return 0.5 * LINK_PER_M * STEP_M * np.count_nonzero(explained)
+        own = (number == ends[0] // 2) | (number == ends[1] // 2)
+        return 0.5 * LINK_PER_M * STEP_M * np.count_nonzero((near_m < UNSEEN_M) & self.is_link[number] & ~own)
 
     def chosen(self) -> list[tuple[int, int]]:
         """List the joins that together cost least."""
         free = np.where(self.is_link, HALF_USED, FREE)
         free_ends = (self.network.degrees()[self.network.ends] == 1).sum(axis=1)
         per_m = np.where(self.is_link, LINK_PER_M, np.where(free_ends == 2, ALONE_PER_M, STUB_PER_M))
-        gains = {ends: free[ends[0] // 2] + free[ends[1] // 2] - cost for ends, cost in self.costs.items()}
+        gains = {
+            ends: free[ends[0] // 2] + free[ends[1] // 2] - cost + self._saved(ends)
+            for ends, cost in self.costs.items()
+        }
         for number in np.flatnonzero(self.lengths < MAX_MERGED_M).tolist():
             # The free end of a piece that ends in a node is the end of a rail, whether it is used or not.
             saved = free[number] * (1 if free_ends[number] == 1 else 2)
