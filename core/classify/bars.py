@@ -41,8 +41,8 @@ GUARD_SHORTER_M = 2.0
 lone rails that are as long as each other are both rails, as where one of each of two tracks is hidden."""
 
 THIRD_RAIL_M, HIGHER_M = 0.5, 0.04
-"""Distance outside of a track within which its third rail is, and least height of this above the rails. Third rails are
-0.3 to 0.45 m from a rail and 50 to 80 mm higher; a rail of another track that is as near is as high as they are."""
+"""Largest distance of a third rail beyond the place of the other rail of a track, and its least height above the rails.
+Third rails are 0.3 to 0.45 m from a rail and 50 to 80 mm higher; a rail of another track as near is as high as both."""
 
 SINGLE_WIDTH = 0.2
 """Least width of a rail without a partner by that of a head. A single profile of the scanner is a bar of no width where
@@ -172,7 +172,7 @@ def _are_guards(kept: Kept, piece: np.ndarray, partnered: np.ndarray, settings: 
     """Return which pieces are guard or third rails of a longer one, or of one with a partner, (pieces,) bool.
 
     A guard rail is as high as the rail within a gauge that it guards; it ends before that, and hides it from a scanner
-    beside the track. So does a third rail, which is higher and outside of the track.
+    beside the track. So does a third rail, which is higher and at most a little further away than the other rail.
     """
     lines = kept.lines
     length_m = np.where(partnered, np.inf, lengths(lines.axis, piece)[piece])

@@ -27,7 +27,7 @@ from ..lines.ends import (
 )
 from ..lines.network import LineNetwork
 from ..progress import SILENT, Progress
-from .junctions import DIRECTION_M, KINK_DEG, branchings, unsteadiness, weld_pairs
+from .junctions import DIRECTION_M, KINK_DEG, branchings, points_of, unsteadiness, weld_pairs
 
 MAX_MERGED_M = 14.0
 """Largest length that two crossing rails share. Heads of 76 mm in cells of 40 mm share 9 m at 1:26.5, and wing rails
@@ -116,9 +116,8 @@ class _Joins:
         self.lengths = network.lengths()
         degrees = network.degrees()[network.ends].min(axis=1, initial=9)
         self.is_link = (degrees >= 2) & (self.lengths < MAX_MERGED_M)
-        parts = [even_points(line) for line in network.lines]
-        self.drawn = cKDTree(np.concatenate([np.empty((0, 2)), *parts]))
-        self.number = np.repeat(np.arange(len(parts)), [len(part) for part in parts])
+        points, self.number = points_of(network)
+        self.drawn = cKDTree(points)
         self.costs: dict[tuple[int, int], float] = {}
         self.bridges: dict[tuple[int, int], Bridge] = {}
         for one, other in self._near():

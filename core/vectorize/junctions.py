@@ -155,6 +155,12 @@ def ends_by_node(network: LineNetwork) -> Iterable[tuple[int, list[int]]]:
     return zip(nodes.tolist(), (group.tolist() for group in np.split(order, first[1:])))
 
 
+def points_of(network: LineNetwork) -> tuple[np.ndarray, np.ndarray]:
+    """Place even points on all lines: returns them, (n, 2) metres, and the number of the line of each, (n,)."""
+    parts = [even_points(line) for line in network.lines]
+    return np.concatenate([np.empty((0, 2)), *parts]), np.repeat(np.arange(len(parts)), [len(part) for part in parts])
+
+
 def branchings(network: LineNetwork) -> Iterator[tuple[int, int, list[int]]]:
     """Yield the nodes in which one line end, the stem, continues in two others, the legs."""
     for node, ends in ends_by_node(network):

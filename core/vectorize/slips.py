@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 from ..lines.ends import STEP_M, even_points, tip_and_direction
 from ..lines.network import LineNetwork
 from ..polyline import runs
-from .junctions import DIRECTION_M, weld_pairs
+from .junctions import DIRECTION_M, points_of, weld_pairs
 
 CLEAR_M = (8.0, 11.0, 14.0)
 """Distances from the middle of a slip from which its legs are taken for those of the crossing, tried in this order."""
@@ -256,9 +256,8 @@ class _Parts:
     @classmethod
     def of(cls, network: LineNetwork) -> _Parts:
         """Place points on the lines of a network."""
-        parts = [even_points(line) for line in network.lines]
-        points = np.concatenate(parts)
-        return cls(points, np.repeat(np.arange(len(parts)), [len(part) for part in parts]), cKDTree(points))
+        points, line = points_of(network)
+        return cls(points, line, cKDTree(points))
 
     def approaches(self) -> np.ndarray:
         """Return the places at which two lines that come closer than `APPROACH_M` are closest, (n, 2)."""
