@@ -24,6 +24,7 @@ from ..lines.ends import (
     cut_back,
     even_points,
     tip_and_direction,
+    turned,
 )
 from ..lines.network import LineNetwork
 from ..progress import SILENT, Progress
@@ -90,7 +91,7 @@ def follow_courses(
     All joins are chosen together: at the least cost, each end has one partner or none, and links are used with both of
     their ends or left out. So two rails that cross share no line, whatever nodes the raster has there. Choosing goes in
     rounds, because a joined line shows better where it leads. Where a line continues in one of two others in a node, it
-    is a branching, which stays; see `part_branches`.
+    is a branching, which stays, in one node; see `part_branches`.
 
     At most `max_gap_m` of a join is away from all cells, `seen`, and both ends point at each other within
     `gap_angle_deg`. The network has no passes.
@@ -222,9 +223,10 @@ def _joined(network: LineNetwork, joins: _Joins) -> tuple[LineNetwork, bool]:
     unused = [number for number in np.flatnonzero(joins.is_link).tolist() if not taken & {2 * number, 2 * number + 1}]
     branching = _branching(network, chosen, unused)
     bridges = _apart({ends: joins.bridges[ends] for ends in chosen if ends not in branching}, joins)
-    if not bridges:
-        return network, False
-    return weld_pairs(network.bridged(bridges, {}, _replaced(network, bridges, unused)), KINK_DEG), True
+    if bridges:
+        return weld_pairs(network.bridged(bridges, {}, _replaced(network, bridges, unused)), KINK_DEG), True
+    single = _in_one_node(network, branching.values(), unused)
+    return single, len(single.lines) < len(network.lines)
 
 
 def _apart(bridges: Mapping[tuple[int, int], Bridge], joins: _Joins) -> dict[tuple[int, int], Bridge]:
@@ -251,19 +253,18 @@ def _replaced(network: LineNetwork, bridges: Mapping[tuple[int, int], Bridge], u
 
 
 def _branching(
-    network: LineNetwork, chosen: Collection[tuple[int, int]], unused: Collection[int]
-) -> set[tuple[int, int]]:
-    """Find the joins that pass nodes, connected by `unused` links, in which one line continues in several.
+    network: LineNetwork, chosen: Collection[tuple[int, int]], unused: Sequence[int]
+) -> dict[tuple[int, int], list[int]]:
+    """Find the joins that pass a place in which one line continues in several, with all ends there but of links.
 
     Such a join leaves a single end over, or several that all leave the line to the same side of branchings.
     """
-    nodes, links = network.ends.ravel(), network.ends[list(unused)].T
-    graph = coo_matrix((np.ones(len(unused)), tuple(links)), shape=(len(network.nodes),) * 2)
-    place = connected_components(graph, directed=False)[1][nodes]
+    nodes = network.ends.ravel()
+    place = _places(network, unused)[nodes]
     place[[2 * number + side for number in unused for side in (0, 1)]] = -1
     known = {node for node, *_ in branchings(network)}
     taken = {end for ends in chosen for end in ends}
-    found = set()
+    found = {}
     for ends in chosen:
         here = np.flatnonzero(place == place[ends[0]])
         left = [end for end in here.tolist() if end not in taken]
@@ -271,8 +272,38 @@ def _branching(
             ahead = _tip(network.from_end(ends[0]))[1]
             onward = {float(_tip(network.from_end(end))[1] @ ahead) > 0 for end in left}
             if len(left) == 1 or len(onward) == 1 and known.issuperset(nodes[here].tolist()):
-                found.add(ends)
+                found[ends] = here.tolist()
     return found
+
+
+def _places(network: LineNetwork, unused: Sequence[int]) -> np.ndarray:
+    """Give nodes that `unused` links connect the same number, (k,)."""
+    graph = coo_matrix((np.ones(len(unused)), tuple(network.ends[unused].T)), shape=(len(network.nodes),) * 2)
+    return connected_components(graph, directed=False)[1]
+
+
+def _in_one_node(network: LineNetwork, branching: Collection[list[int]], unused: Sequence[int]) -> LineNetwork:
+    """Let the three lines of each branching meet in the node of two of them, without the links around it.
+
+    Where rails part, holes between their heads and where blurred heads touch again make several nodes with links.
+    """
+    place = _places(network, unused)
+    at = place[network.ends[unused, 0]]
+    lines, nodes, ends, dropped = list(network.lines), list(network.nodes), network.ends.copy(), []
+    for own in branching:
+        links = np.flatnonzero(at == place[ends.flat[own[0]]]).tolist()
+        if not links or not len({end // 2 for end in own}) == len(own) == 3:
+            continue
+        middle = np.median(network.nodes[network.ends.ravel()[own]], axis=0)
+        for end in own:
+            line = turned(lines[end // 2], end)
+            if not np.array_equal(line[0], middle):
+                lines[end // 2] = turned(np.concatenate([[middle], line]), end)
+            ends.flat[end] = len(nodes)
+        nodes.append(middle)
+        dropped += [unused[link] for link in links]
+    keep = ~np.isin(np.arange(len(lines)), dropped)
+    return LineNetwork(tuple(lines), np.array(nodes).reshape(-1, 2), ends).select(keep)
 
 
 def best_pairs(gains: Mapping[tuple[int, int], float]) -> set[tuple[int, int]]:

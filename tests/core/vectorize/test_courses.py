@@ -11,7 +11,7 @@ from rail_extract.core.lines.network import LineNetwork
 from rail_extract.core.parameters import Parameters
 from rail_extract.core.polyline import Polyline, project
 from rail_extract.core.vectorize.courses import best_pairs, follow_courses
-from rail_extract.core.vectorize.junctions import cut_bends
+from rail_extract.core.vectorize.junctions import branchings, cut_bends
 from scipy.spatial import cKDTree
 
 SLOPE = 1 / 12
@@ -137,6 +137,38 @@ def test_the_rail_between_the_toe_and_the_frog_of_a_short_turnout_is_not_the_sha
     found = resolved(turnout)
     on_it = [line for line in found.lines if np.any((np.abs(line[:, 0] - length_m / 2) < 0.5) & (line[:, 1] == 0))]
     assert len(on_it) == 1
+
+
+def around_holes(holes_m, neck_m=0.3):
+    """Draw links around holes between heads that touch in between, and list the nodes where they touch."""
+    x = np.cumsum([0.0, *(length for hole_m in holes_m for length in (hole_m, neck_m))])
+    sides = [(2 * k, (x[2 * k : 2 * k + 2].mean(), up), 2 * k + 1) for k in range(len(holes_m)) for up in (0.1, -0.1)]
+    necks = [(k, (x[k : k + 2].mean(), 0.0), k + 1) for k in range(1, len(x) - 1, 2)]
+    return sides + necks, [(place, 0.0) for place in x]
+
+
+@pytest.mark.parametrize("holes_m", [(0.5,), (1.5,), (0.6, 1.1)])
+def test_a_hole_in_a_rail_is_no_second_rail(holes_m):
+    links, nodes = around_holes(holes_m)
+    x = np.arange(0.2, 25.0, 0.2)
+    ends = [(0, np.column_stack([-x, 0 * x])), (len(nodes) - 1, np.column_stack([nodes[-1][0] + x, 0 * x]))]
+    (whole,) = resolved(network(ends, links, nodes)).lines
+    assert np.abs(whole[:, 1]).max() < 1e-9
+    assert np.ptp(whole[:, 0]) > 49
+
+
+@pytest.mark.parametrize("holes_m", [(0.6,), (1.4,), (0.6, 1.1)])
+def test_holes_where_heads_begin_to_part_leave_one_branching(holes_m):
+    """In worlds 10393 and 10512, blurred heads that part touched again beyond a hole: the branch began there."""
+    links, nodes = around_holes(holes_m)
+    x = np.arange(0.2, 25.0, 0.2)
+    stem = (0, np.column_stack([-x, 0 * x]))
+    part = [(len(nodes) - 1, np.column_stack([nodes[-1][0] + x, 0.1 + 0 * x + side * (0.06 * x)])) for side in (0, 1)]
+    found = resolved(network([stem, *part], links, nodes))
+    ((node, through, _),) = branchings(found)
+    assert len(found.lines) == 3
+    assert found.from_end(through)[-1, 0] < 0
+    np.testing.assert_allclose(found.nodes[node], nodes[-1])
 
 
 LENGTH_M, RAMP_M, CHECK_RAIL_M = 60.0, 2.0, 0.13
