@@ -28,10 +28,10 @@ def cells_of(lines):
     return cKDTree(CELL_M * np.unique(np.round(np.concatenate(heads) / CELL_M), axis=0))
 
 
-def opened(lines):
+def opened(lines, seen=None):
     ends = np.arange(2 * len(lines)).reshape(-1, 2)
     nodes = np.concatenate([line[[0, -1]] for line in lines])
-    return open_slips(LineNetwork(tuple(lines), nodes, ends), cells_of(lines))
+    return open_slips(LineNetwork(tuple(lines), nodes, ends), seen or cells_of(lines))
 
 
 @pytest.mark.parametrize(("number", "radius_m"), [(9.0, 190.0), (6.6, 117.0)])
@@ -59,7 +59,7 @@ def test_lines_that_come_close_and_part_again_are_left_as_they_are():
 @pytest.mark.parametrize(("number", "radius_m"), [(9.0, 190.0), (9.0, 215.0), (9.0, 230.0), (14.0, 500.0)])
 def test_a_slip_curve_passes_the_crossing_as_its_radius_says(number, radius_m):
     _, slips = opened(lines_beside_a_slip(number, radius_m))
-    heights = [height for slip in slips for height, _ in slip.heights]
+    heights = [curve.height for slip in slips for curve in slip.curves]
     expected = radius_m * (0.5 * np.arctan(1 / number)) ** 2 / 2
     np.testing.assert_allclose(heights, [expected] * 2, atol=0.03)
 
@@ -78,3 +78,14 @@ def test_rails_between_the_legs_of_a_slip_stay():
     network, slips = opened([*lines_beside_a_slip(9.0, 230.0), between])
     assert [slip.clear_m for slip in slips] == [11.0, 11.0]
     assert any(np.array_equal(line, between) for line in network.lines)
+
+
+@pytest.mark.parametrize(("hidden_m", "rails", "expected"), [(3.2, 1, 2), (3.2, 2, 0), (5.0, 1, 0)])
+def test_what_is_hidden_of_one_rail_of_a_slip_curve_the_other_shows(hidden_m, rails, expected):
+    """A curve of 117 m is apart from the rails that cross for 8 m; in world 10340, a third of one rail is hidden."""
+    lines = lines_beside_a_slip(6.6, 117.0)
+    x, y = np.array(cells_of(lines).data).T
+    curve_m = np.array([SPACING_M * number - 117.0 * (0.5 * np.arctan(1 / 6.6)) ** 2 / 2 for number in range(rails)])
+    hidden = (x > 0) & (x < hidden_m) & (np.abs(y[:, None] - curve_m).min(axis=1) < 0.15)
+    _, slips = opened(lines, cKDTree(np.column_stack([x, y])[~hidden]))
+    assert len(slips) == expected
