@@ -48,8 +48,10 @@ on the view. Seen from above a track, the left and the right corner differ by 1.
 EDGE_ROUNDS = 2
 """The first round finds out how the scanner sees the head, the second uses the edges that count."""
 
-REACH_HEADS = 1.0
-"""Distance from the line, in head widths, within which the ridge is a parabola: a Gaussian of 7 cm is, to a tenth."""
+REACH_HEADS, TOP_HEADS = 1.0, 0.4
+"""Distances from the line, in head widths, within which the ridge is a parabola, as a Gaussian of 7 cm is to a tenth,
+and within which points are on the top. Those beyond it show what lies beside the head, too, which may differ on both
+sides: a road, or echoes of beams that only an edge of the head meets, as high as the head."""
 
 LEAST_ON_RIDGE = 8
 """Least points that a parabola is fitted to, whose three unknowns they determine with as many to spare."""
@@ -217,44 +219,59 @@ class Ridge:
     def find(cls, points: HeadPoints) -> Ridge | None:
         """Fit one parabola, and a crest for each window, to points; None with too few, or if they are not blunt.
 
-        Next to another head, both are one ridge, whose crest is between them.
+        Next to another head, both are one ridge, whose crest is between them. Points on the top decide alone where
+        those beside it draw the crest of the line aside.
         """
         near = points[points.within(REACH_HEADS)]
         near = near[near.alone] if np.count_nonzero(near.alone) >= LEAST_ON_RIDGE else near
         if not points.is_blunt or len(near.t) < LEAST_ON_RIDGE:
             return None
-        row, rows = near.station, len(near.stations)
-        x, up = near.across, near.z - rough_level(near.t, near.z)
-        used = np.ones(len(x), dtype=bool)
-        for _ in range(SLOPE_ROUNDS):
-            bend = max(-2 * float(np.polynomial.polynomial.polyfit(x[used], up[used], 2)[2]), MIN_BEND)
-            flat = up + 0.5 * bend * x**2
-            noise_m = robust_sigma(flat[used])
-            level, slope, crest, information = _crests(row[used], rows, x[used], flat[used], bend, noise_m)
-            off = np.abs(flat - level[row] - slope[row] * x) > OFF_TOP_SIGMAS * noise_m
-            if np.count_nonzero(~off) < LEAST_ON_RIDGE:
-                break
-            used = ~off
-        return cls(near.stations, crest, information, np.full(rows, np.hypot(CREST_SIGMA_M, TILT / bend)))
+        sums = np.array([near.per_station().astype(float), near.per_station(near.across)])
+        count, across = uniform_filter1d(sums, WINDOW, axis=1, mode="constant")
+        likely, top = across / np.maximum(count, 1e-9), near[near.within(TOP_HEADS)]
+        crest, information, bend = _fitted(near, likely)
+        if len(top.t) >= LEAST_ON_RIDGE:
+            of_top = _fitted(top, likely)
+            doubt_m = np.hypot(CREST_SIGMA_M, 1 / np.sqrt(of_top[1].sum()))
+            if abs(np.average(of_top[0] - crest, weights=of_top[1])) > doubt_m:
+                crest, information, bend = of_top
+        return cls(near.stations, crest, information, np.full(len(crest), np.hypot(CREST_SIGMA_M, TILT / bend)))
+
+
+def _fitted(near: HeadPoints, likely: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+    """Return the crest at each station and the information about it, (s,) each, and the bend of the parabola."""
+    row, x, up = near.station, near.across, near.z - rough_level(near.t, near.z)
+    used = np.ones(len(x), dtype=bool)
+    for _ in range(SLOPE_ROUNDS):
+        bend = max(-2 * float(np.polynomial.polynomial.polyfit(x[used], up[used], 2)[2]), MIN_BEND)
+        flat = up + 0.5 * bend * x**2
+        noise_m = robust_sigma(flat[used])
+        level, slope, crest, information = _crests(row[used], likely, x[used], flat[used], bend, noise_m)
+        off = np.abs(flat - level[row] - slope[row] * x) > OFF_TOP_SIGMAS * noise_m
+        if np.count_nonzero(~off) < LEAST_ON_RIDGE:
+            break
+        used = ~off
+    return crest, information, bend
 
 
 def _crests(
-    row: np.ndarray, rows: int, x: np.ndarray, flat: np.ndarray, bend: float, noise_m: float
+    row: np.ndarray, likely: np.ndarray, x: np.ndarray, flat: np.ndarray, bend: float, noise_m: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Fit level and slope across to the points of each window, and the crest to those of each station, (rows,) each.
+    """Fit level and slope across to the points of each window, and the crest to those of each station, (s,) each.
 
     The fourth array is the information about the crest, 1/m²: from the offsets of the points about their mean, and from
-    the prior of the window, by which the crest is at this mean.
+    the prior of the window, by which the crest is at its `likely` place, (s,).
     """
+    rows = len(likely)
     sums = np.array([np.bincount(row, one, rows) for one in (np.ones_like(x), x, flat, x * x, x * flat)])
     count, sx, sy, xx, xy = uniform_filter1d(sums, WINDOW, axis=1, mode="constant") * WINDOW
     count = np.where(count > 0.5, count, np.inf)
     mean, level = sx / count, sy / count
     prior_m2 = (noise_m / bend / LEANING_M) ** 2
-    slope = (xy - mean * sy + prior_m2 * bend * mean) / (xx - mean * sx + prior_m2)
+    slope = (xy - mean * sy + prior_m2 * bend * likely) / (xx - mean * sx + prior_m2)
     points, sx, sy, xx, xy = sums
     own_prior = prior_m2 / WINDOW * (count < np.inf)
     spread = xx - 2 * mean * sx + points * mean**2 + own_prior
-    product = xy - mean * sy - level * sx + points * mean * level + own_prior * bend * mean
+    product = xy - mean * sy - level * sx + points * mean * level + own_prior * bend * likely
     crest = product / (bend * np.maximum(spread, 1e-12))
     return level - slope * mean, slope, crest, spread * (bend / noise_m) ** 2

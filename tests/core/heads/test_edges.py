@@ -11,12 +11,12 @@ def ridge_of(t, across, z):
     return Ridge.find(HeadPoints(t, across, z, WIDTH, line, free, is_blunt=True))
 
 
-def ridge_points(offset_m=0.0, noise_m=0.015, slope=0.0, per_m=40, seed=0):
+def ridge_points(offset_m=0.0, noise_m=0.015, slope=0.0, per_m=40, seed=0, bend=BEND):
     """Points of a blurred head, 56 mm to either side of its crest, as the classification gives them."""
     rng = np.random.default_rng(seed)
     t = np.sort(rng.uniform(0, LENGTH_M, int(per_m * LENGTH_M)))
     x = rng.uniform(-0.056, 0.056, len(t))
-    z = 100.0 + 0.01 * t - 0.5 * BEND * x**2 + slope * x + rng.normal(0, noise_m, len(t))
+    z = 100.0 + 0.01 * t - 0.5 * bend * x**2 + slope * x + rng.normal(0, noise_m, len(t))
     return t, x + offset_m, z
 
 
@@ -27,6 +27,22 @@ def test_the_crest_is_found_within_its_standard_error(offset_m):
     assert abs(np.average(ridge.offset_m, weights=ridge.information) - offset_m) < 0.003
     of_stations = ((ridge.offset_m - offset_m) * np.sqrt(ridge.information))[20:-20]
     assert 0.5 < np.sqrt(np.mean(of_stations**2)) < 1.6
+
+
+def test_noise_that_hides_the_crest_leaves_it_at_the_mean_of_the_points():
+    """Not at the line, about which the points on the top are chosen."""
+    t, across, z = ridge_points(0.01, noise_m=0.06, per_m=20)
+    ridge = ridge_of(t, across, z)
+    assert abs(np.average(ridge.offset_m, weights=ridge.information) - 0.01) < 0.005
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+def test_what_is_as_high_as_the_head_beside_it_does_not_draw_the_crest_aside(side):
+    """A road on one side of a tram rail, or echoes of beams that hit only one edge: crests were up to 37 mm off."""
+    t, across, z = ridge_points(noise_m=0.01, bend=40.0)
+    beside = side * across > 0.5 * WIDTH
+    ridge = ridge_of(t, across, np.where(beside, 100.0 + 0.01 * t, z))
+    assert abs(np.average(ridge.offset_m, weights=ridge.information)) < 0.004
 
 
 @pytest.mark.parametrize("count", [0, 1, 2, 3, 5, 12])
