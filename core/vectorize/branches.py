@@ -16,6 +16,7 @@ from ..lines.ends import (
     FIT_M,
     MISFIT_M,
     STEP_M,
+    STRAIGHT,
     Bridge,
     PartingLaw,
     bridge,
@@ -29,6 +30,7 @@ from ..progress import SILENT, Progress
 from .courses import MISFIT_M as KNOWN_MISFIT_M
 from .courses import SKIP_M, unseen_m
 from .junctions import DIRECTION_M, branchings, unsteadiness
+from .slips import MIN_ANGLE_DEG
 
 MAX_BACK_M = 40.0
 """Largest length by which a branch is extended back: on a radius of 2500 m, as at 1:26.5, two rails are 0.2 m apart
@@ -43,6 +45,10 @@ off a constant curvature by 18 mm, several times the uncertainty from stairs; ov
 
 MAX_BESIDE_M = 1.0
 """A branch that ends further from a rail is not connected to it: nothing of the switch has been seen."""
+
+PARTED_M = 0.3
+"""Two blurred heads are one ridge up to 0.2 m apart, and what is cut off where they part may lead 0.09 m further. A
+line that ends further from a rail was not seen to leave it: if it is straight, it is a leg of a crossing."""
 
 MIN_AHEAD_M = 4.0
 """Shortest length of a stock rail beyond the end of its branch, where the branch is to be connected."""
@@ -151,7 +157,12 @@ def _touch(from_end: np.ndarray, line: np.ndarray) -> tuple[int, Bridge] | None:
     apart_m = np.interp(own_x, np.maximum.accumulate(x), y) - own_y
     if len(own_x) < MIN_POINTS or len(set(np.sign(apart_m))) > 1:
         return None
-    touch_m = -PartingLaw.fitted(-own_x, np.abs(apart_m), ARC).way_at(MISFIT_M)
+    arc, straight = (PartingLaw.fitted(-own_x, np.abs(apart_m), power) for power in (ARC, STRAIGHT))
+    if abs(apart_m[0]) > PARTED_M and straight.slope > np.tan(np.radians(MIN_ANGLE_DEG)):
+        of_arc, of_straight = (np.std(law(-own_x) - np.abs(apart_m)) for law in (arc, straight))
+        if of_straight < of_arc:
+            return None
+    touch_m = -arc.way_at(MISFIT_M)
     if not 0 < touch_m < min(MAX_BACK_M, x[-1]):
         return None
     onward = way[int(np.abs(x - touch_m).argmin())]

@@ -67,3 +67,16 @@ def test_a_branch_that_ends_freely_is_extended_tangentially_to_its_stock_rail(ra
     np.testing.assert_array_equal(network.lines[line], stock)
     assert network.nodes[node][0] == pytest.approx(10 + np.sqrt(2 * radius * MISFIT_M), abs=0.2)
     assert cKDTree(np.concatenate([stock, arc])).query(network.lines[1])[0].max() < 0.06
+
+
+@pytest.mark.parametrize("apart_m", [0.35, 0.5])
+@pytest.mark.parametrize(("radius", "joined"), [(190, True), (300, True), (np.inf, False)])
+def test_a_straight_leg_of_a_crossing_is_no_branch(apart_m, radius, joined):
+    """In worlds 10159 and 10431, flangeways and the end of the cloud hid where such legs crossed the rail."""
+    stock, x = along_x(0, 80), np.arange(0, 30, 0.1)
+    way = x / 12 + apart_m if radius == np.inf else (x + np.sqrt(2 * radius * apart_m)) ** 2 / (2 * radius)
+    leg = np.column_stack([30 + x, 0.04 * np.round(way / 0.04)])
+    lines = (stock, leg[leg[:, 1] < 3.0])
+    loose = LineNetwork(lines, np.concatenate([line[[0, -1]] for line in lines]), np.arange(4).reshape(2, 2))
+    network = attach_branches(loose, cKDTree(np.concatenate(lines)), 20.0)
+    assert sorted(network.degrees()) == ([1, 1, 1, 3] if joined else [1] * 4)
