@@ -53,6 +53,10 @@ REACH_HEADS, TOP_HEADS = 1.0, 0.4
 and within which points are on the top. Those beyond it show what lies beside the head, too, which may differ on both
 sides: a road, or echoes of beams that only an edge of the head meets, as high as the head."""
 
+ASIDE_SIGMAS = 3.0
+"""Standard errors by which the crest of the top must differ from that of all points to be the right one: the points on
+the top of a line of a few metres show it to 5 mm only."""
+
 LEAST_ON_RIDGE = 8
 """Least points that a parabola is fitted to, whose three unknowns they determine with as many to spare."""
 
@@ -232,7 +236,7 @@ class Ridge:
         crest, information, bend = _fitted(near, likely)
         if len(top.t) >= LEAST_ON_RIDGE:
             of_top = _fitted(top, likely)
-            doubt_m = np.hypot(CREST_SIGMA_M, 1 / np.sqrt(of_top[1].sum()))
+            doubt_m = np.hypot(CREST_SIGMA_M, ASIDE_SIGMAS / np.sqrt(of_top[1].sum()))
             if abs(np.average(of_top[0] - crest, weights=of_top[1])) > doubt_m:
                 crest, information, bend = of_top
         return cls(near.stations, crest, information, np.full(len(crest), np.hypot(CREST_SIGMA_M, TILT / bend)))

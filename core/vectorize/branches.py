@@ -50,6 +50,10 @@ PARTED_M = 0.3
 """Two blurred heads are one ridge up to 0.2 m apart, and what is cut off where they part may lead 0.09 m further. A
 line that ends further from a rail was not seen to leave it: if it is straight, it is a leg of a crossing."""
 
+STRAIGHTER = 0.9
+"""Scatter about a straight line, by that about an arc that touches the rail, up to which a line is straight. About an
+arc that bends little over its last 8 m both are the stairs of the raster, and within 10 % of each other by chance."""
+
 MIN_AHEAD_M = 4.0
 """Shortest length of a stock rail beyond the end of its branch, where the branch is to be connected."""
 
@@ -160,7 +164,7 @@ def _touch(from_end: np.ndarray, line: np.ndarray) -> tuple[int, Bridge] | None:
     arc, straight = (PartingLaw.fitted(-own_x, np.abs(apart_m), power) for power in (ARC, STRAIGHT))
     if abs(apart_m[0]) > PARTED_M and straight.slope > np.tan(np.radians(MIN_ANGLE_DEG)):
         of_arc, of_straight = (np.std(law(-own_x) - np.abs(apart_m)) for law in (arc, straight))
-        if of_straight < of_arc:
+        if of_straight < STRAIGHTER * of_arc:
             return None
     touch_m = -arc.way_at(MISFIT_M)
     if not 0 < touch_m < min(MAX_BACK_M, x[-1]):

@@ -13,6 +13,7 @@ from scipy.optimize import linear_sum_assignment
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
+from scipy.spatial.distance import cdist
 
 from ..lines.ends import (
     STAIRS_M,
@@ -283,7 +284,7 @@ def _places(network: LineNetwork, unused: Sequence[int]) -> np.ndarray:
 
 
 def _in_one_node(network: LineNetwork, branching: Collection[list[int]], unused: Sequence[int]) -> LineNetwork:
-    """Let the three lines of each branching meet in the node of two of them, without the links around it.
+    """Let the three lines of each branching meet in the node that is nearest to all, without the links around it.
 
     Where rails part, holes between their heads and where blurred heads touch again make several nodes with links.
     """
@@ -294,7 +295,8 @@ def _in_one_node(network: LineNetwork, branching: Collection[list[int]], unused:
         links = np.flatnonzero(at == place[ends.flat[own[0]]]).tolist()
         if not links or not len({end // 2 for end in own}) == len(own) == 3:
             continue
-        middle = np.median(network.nodes[network.ends.ravel()[own]], axis=0)
+        nodes_of = network.nodes[network.ends.ravel()[own]]
+        middle = nodes_of[np.argmin(cdist(nodes_of, nodes_of).sum(axis=0))]
         for end in own:
             line = turned(lines[end // 2], end)
             if not np.array_equal(line[0], middle):

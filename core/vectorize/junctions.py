@@ -6,6 +6,7 @@ See docs/method.md section 4.6.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 from scipy.ndimage import median_filter
@@ -54,8 +55,8 @@ STEADY_BEND_M = 10.1
 
 
 def clean_junctions(network: LineNetwork, head_width_m: float) -> LineNetwork:
-    """Drop spurs and rungs between rails, and join lines at nodes of degree 2."""
-    network = drop_rungs(weld_pairs(network), RUNG_HEADS * head_width_m)
+    """Drop spurs, loops and rungs between rails, and join lines at nodes of degree 2."""
+    network = drop_loops(drop_rungs(weld_pairs(network), RUNG_HEADS * head_width_m), SPUR_M)
     return drop_spurs(weld_pairs(network), SPUR_M)
 
 
@@ -105,6 +106,18 @@ def drop_rungs(network: LineNetwork, length_m: float) -> LineNetwork:
             steep &= bool(deflections(network, others)[0, 1:].min() > RUNG_DEG)
         keep[line] = not steep
     return network.select(keep)
+
+
+def drop_loops(network: LineNetwork, length_m: float) -> LineNetwork:
+    """Draw one straight line for two shorter than `length_m` between the same two nodes: one rail with a hole."""
+    lines, keep = list(network.lines), np.ones(len(network.lines), dtype=bool)
+    between: dict[tuple[int, ...], int] = {}
+    for number in np.flatnonzero(network.lengths() < length_m).tolist():
+        ends = network.ends[number].tolist()
+        first = between.setdefault(tuple(sorted(ends)), number)
+        if first != number and ends[0] != ends[1]:
+            lines[first], keep[number] = network.nodes[network.ends[first]], False
+    return replace(network, lines=tuple(lines)).select(keep)
 
 
 def run_through(network: LineNetwork) -> LineNetwork:

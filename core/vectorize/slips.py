@@ -143,9 +143,11 @@ class _Cross:
         if found > highest:
             return None
         length = float(self._seen_m(found))
+        if length < MIN_SEEN_M:
+            return None
         parts = np.unique(np.floor(x[np.abs(height - found) <= HALF_HEAD_M] / COVER_M))
         covered = min(len(parts) * COVER_M / length, 1.0)
-        return Curve(found, side, covered) if length >= MIN_SEEN_M and covered + 1.0 >= 2 * MIN_COVERED else None
+        return Curve(found, side, covered) if covered + 1.0 >= 2 * MIN_COVERED else None
 
     def _seen_m(self, height: np.ndarray | float) -> np.ndarray:
         """Return the length on which curves at such heights are `SEPARATE_M` from both lines.

@@ -45,6 +45,14 @@ def test_what_is_as_high_as_the_head_beside_it_does_not_draw_the_crest_aside(sid
     assert abs(np.average(ridge.offset_m, weights=ridge.information)) < 0.004
 
 
+def test_chance_does_not_choose_the_few_points_on_the_top_of_a_short_line():
+    for seed in range(60):
+        t, across, z = ridge_points(per_m=20, seed=seed, bend=48.0)
+        near = t < 6.0
+        ridge = ridge_of(t[near], across[near], z[near])
+        assert abs(np.average(ridge.offset_m, weights=ridge.information)) < 0.005
+
+
 @pytest.mark.parametrize("count", [0, 1, 2, 3, 5, 12])
 def test_a_few_points_show_a_crest_or_none(count):
     """Two points of the branch of a world drawn at random stopped the whole run."""

@@ -69,8 +69,11 @@ def test_a_branch_that_ends_freely_is_extended_tangentially_to_its_stock_rail(ra
     assert cKDTree(np.concatenate([stock, arc])).query(network.lines[1])[0].max() < 0.06
 
 
-@pytest.mark.parametrize("apart_m", [0.35, 0.5])
-@pytest.mark.parametrize(("radius", "joined"), [(190, True), (300, True), (np.inf, False)])
+@pytest.mark.parametrize(
+    ("radius", "apart_m", "joined"),
+    [(np.inf, 0.35, False), (np.inf, 0.5, False)]
+    + [(radius, apart_m, True) for radius in (50, 190, 300, 500) for apart_m in (0.35, 0.5, 0.7)],
+)
 def test_a_straight_leg_of_a_crossing_is_no_branch(apart_m, radius, joined):
     """In worlds 10159 and 10431, flangeways and the end of the cloud hid where such legs crossed the rail."""
     stock, x = along_x(0, 80), np.arange(0, 30, 0.1)

@@ -80,6 +80,17 @@ def test_rails_between_the_legs_of_a_slip_stay():
     assert any(np.array_equal(line, between) for line in network.lines)
 
 
+@pytest.mark.parametrize("number", [9.0, 18.0, 24.0])
+def test_a_crossing_with_cells_on_its_axis_is_no_slip(number):
+    """At such a cell, a curve of no height was as likely as any: flat crossings stopped the run."""
+    x = np.arange(-30, 30.05, 0.1)
+    slope = np.tan(0.5 * np.arctan(1 / number))
+    lines = [np.column_stack([x, side * slope * x + up]) for up in (0.0, SPACING_M) for side in (1, -1)]
+    network, slips = opened(lines)
+    assert not slips
+    assert len(network.lines) == 4
+
+
 @pytest.mark.parametrize(("hidden_m", "rails", "expected"), [(3.2, 1, 2), (3.2, 2, 0), (5.0, 1, 0)])
 def test_what_is_hidden_of_one_rail_of_a_slip_curve_the_other_shows(hidden_m, rails, expected):
     """A curve of 117 m is apart from the rails that cross for 8 m; in world 10340, a third of one rail is hidden."""
