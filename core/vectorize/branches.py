@@ -161,11 +161,9 @@ def _touch(from_end: np.ndarray, line: np.ndarray) -> tuple[int, Bridge] | None:
     apart_m = np.interp(own_x, np.maximum.accumulate(x), y) - own_y
     if len(own_x) < MIN_POINTS or len(set(np.sign(apart_m))) > 1:
         return None
-    arc, straight = (PartingLaw.fitted(-own_x, np.abs(apart_m), power) for power in (ARC, STRAIGHT))
-    if abs(apart_m[0]) > PARTED_M and straight.slope > np.tan(np.radians(MIN_ANGLE_DEG)):
-        of_arc, of_straight = (np.std(law(-own_x) - np.abs(apart_m)) for law in (arc, straight))
-        if of_straight < STRAIGHTER * of_arc:
-            return None
+    arc = PartingLaw.fitted(-own_x, np.abs(apart_m), ARC)
+    if _is_leg(-own_x, np.abs(apart_m), arc):
+        return None
     touch_m = -arc.way_at(MISFIT_M)
     if not 0 < touch_m < min(MAX_BACK_M, x[-1]):
         return None
@@ -177,6 +175,18 @@ def _touch(from_end: np.ndarray, line: np.ndarray) -> tuple[int, Bridge] | None:
     further = int(np.searchsorted(Polyline(stock).t, curve.cuts_m[1]))
     vertex = int(onward + further if way[0] < way[-1] else onward - further)
     return (vertex, curve) if 0 < vertex < len(line) - 1 else None
+
+
+def _is_leg(way: np.ndarray, apart: np.ndarray, arc: PartingLaw) -> bool:
+    """Return whether a line that ends beside a rail is a straight leg of a crossing, not the branch that `arc` is.
+
+    `way` and `apart`, (n,), are the way along the rail from the line's end and the distance between both there.
+    """
+    straight = PartingLaw.fitted(way, apart, STRAIGHT)
+    if apart[0] <= PARTED_M or straight.slope <= np.tan(np.radians(MIN_ANGLE_DEG)):
+        return False
+    of_arc, of_straight = (np.std(law(way) - apart) for law in (arc, straight))
+    return bool(of_straight < STRAIGHTER * of_arc)
 
 
 def choose_routes(network: LineNetwork) -> LineNetwork:

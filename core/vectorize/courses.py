@@ -290,22 +290,19 @@ def _in_one_node(network: LineNetwork, branching: Collection[list[int]], unused:
     """
     place = _places(network, unused)
     at = place[network.ends[unused, 0]]
-    lines, nodes, ends, dropped = list(network.lines), list(network.nodes), network.ends.copy(), []
+    lines, ends, dropped = list(network.lines), network.ends.copy(), []
     for own in branching:
-        links = np.flatnonzero(at == place[ends.flat[own[0]]]).tolist()
+        nodes = network.ends.flat[own]
+        links = np.flatnonzero(at == place[nodes[0]]).tolist()
         if not links or not len({end // 2 for end in own}) == len(own) == 3:
             continue
-        nodes_of = network.nodes[network.ends.ravel()[own]]
-        middle = nodes_of[np.argmin(cdist(nodes_of, nodes_of).sum(axis=0))]
-        for end in own:
-            line = turned(lines[end // 2], end)
-            if not np.array_equal(line[0], middle):
-                lines[end // 2] = turned(np.concatenate([[middle], line]), end)
-            ends.flat[end] = len(nodes)
-        nodes.append(middle)
+        places = network.nodes[nodes]
+        nearest = int(np.argmin(cdist(places, places).sum(axis=0)))
+        for end in (end for end, node in zip(own, nodes) if node != nodes[nearest]):
+            lines[end // 2] = turned(np.concatenate([places[[nearest]], turned(lines[end // 2], end)]), end)
+        ends.flat[own] = nodes[nearest]
         dropped += [unused[link] for link in links]
-    keep = ~np.isin(np.arange(len(lines)), dropped)
-    return LineNetwork(tuple(lines), np.array(nodes).reshape(-1, 2), ends).select(keep)
+    return replace(network, lines=tuple(lines), ends=ends).select(~np.isin(np.arange(len(lines)), dropped))
 
 
 def best_pairs(gains: Mapping[tuple[int, int], float]) -> set[tuple[int, int]]:

@@ -161,8 +161,11 @@ class _Cross:
         """Draw a curve between the places where it touches the lines that cross, (n, 2)."""
         tangent = 2 * curve.height / self.half_angle
         x = np.linspace(-tangent, tangent, int(2 * tangent / STEP_M) + 2)
-        y = curve.side * (curve.height + (x * self.half_angle) ** 2 / (4 * curve.height))
-        return self.place + np.column_stack([x, y]) @ self.axes
+        return self.place + np.column_stack([x, curve.side * self.height_at(x, curve)]) @ self.axes
+
+    def height_at(self, x: np.ndarray, curve: Curve) -> np.ndarray:
+        """Return the distance of a curve from the mean of both lines at places `x` along this, (n,) metres."""
+        return curve.height + (x * self.half_angle) ** 2 / (4 * curve.height)
 
 
 @dataclass(frozen=True)
@@ -177,9 +180,9 @@ class Slip:
         """Return which places, (n, 2), are inside: between the legs and the curves, or on them."""
         x, y = self.cross.axes @ (places - self.cross.place).T
         low, top = (np.abs(x) * self.cross.half_angle + side_m for side_m in (-SIDE_M, SIDE_M))
-        for height, side, _ in self.curves:
-            curved = height + (x * self.cross.half_angle) ** 2 / (4 * height) + SIDE_M
-            top = np.where(side * y > 0, np.maximum(top, curved), top)
+        for curve in self.curves:
+            curved = self.cross.height_at(x, curve) + SIDE_M
+            top = np.where(curve.side * y > 0, np.maximum(top, curved), top)
         return (np.abs(x) < self.clear_m) & (np.abs(y) < top) & (np.abs(y) > low)
 
     def is_beside(self, other: Slip) -> bool:
