@@ -410,6 +410,8 @@ class SearchFigures:
     sharp_m, round_m : float
         Length of the rails with a partner that are as narrow as a head, and of those that are wider and round, before
         the cloud is known to be blunt; see `classify.ways`.
+    clear_m : float
+        Length of those as narrow as a head that stand clear of their bed: no tops of them are too low to be seen.
     unsure_m : float
         Length of those that are wider, but not round and not too wide for a head, and of rails in pavements.
     """
@@ -429,6 +431,7 @@ class SearchFigures:
     sharp_m: float = 0.0
     round_m: float = 0.0
     unsure_m: float = 0.0
+    clear_m: float = 0.0
 
     def __add__(self, other: SearchFigures) -> SearchFigures:
         return SearchFigures(*(one + more for one, more in zip(astuple(self), astuple(other))))

@@ -27,6 +27,7 @@ from .partner import MAJORITY, SPACING_M, rise_above, runs_inside
 from .pieces import LEAST_SINGLE_M, lengths, mean_of, pieces_of, with_partner
 from .ridges import Ridges
 from .settings import Settings, Tolerances
+from .tops import LOW_M
 
 SINGLE_HEIGHT_M = 0.12
 """Least height above the bed of a rail without a partner: lower things are edges of slopes, kerbs and boards."""
@@ -69,6 +70,10 @@ SHARP_WIDER_M = 0.011
 cloud and more: up to 5 mm by scanners on the ground, 10 mm by some wide beams from the air, and from 11 mm on
 in images that blur by 2 cm."""
 
+CLEAR_M = LOW_M + 0.015
+"""Least mean height above its bed of a piece that stands clear of it: ballast scatters by up to 15 mm, so that tops of
+lower ones are too low to count in places."""
+
 
 def on_bars(
     kept: Kept, thin: bool, found: Candidates, shown: Shown, settings: Settings, tolerances: Tolerances
@@ -84,12 +89,13 @@ def on_bars(
     width_m, share_m = beside.widths(kept.lines, piece), own_lengths(kept, settings)
     narrow = (width_m < settings.head_width_m + tolerances.wider_m)[piece]
     kinds = _by_shape(kept, piece, width_m, narrow, shown, settings)
-    sharp_m, round_m, unsure_m = (float(share_m[kind].sum()) for kind in kinds)
+    clear = kinds[0] & (mean_of(kept.lines.height, piece) >= CLEAR_M)[piece]
+    sharp_m, round_m, unsure_m, clear_m = (float(share_m[kind].sum()) for kind in (*kinds, clear))
     kept = _with_kept_partners(kept.of(narrow), settings, tolerances)
     beside = Near.find(shown.xy[chosen], kept.lines)
     rails = _are_rails(kept, beside, shown, settings, tolerances)
     standing = as_wanted(kept, rails, chosen, beside, thin, settings, tolerances)
-    return replace(standing, sharp_m=sharp_m, round_m=round_m, unsure_m=unsure_m)
+    return replace(standing, sharp_m=sharp_m, round_m=round_m, unsure_m=unsure_m, clear_m=clear_m)
 
 
 def _completed(found: Candidates, kept: Kept, settings: Settings, tolerances: Tolerances) -> np.ndarray:

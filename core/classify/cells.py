@@ -127,7 +127,7 @@ class Standing:
         Whether the square is thin.
     rails : Kept
         Those that the guide leaves out as well.
-    sharp_m, round_m, unsure_m : float
+    sharp_m, round_m, unsure_m, clear_m : float
         See `SearchFigures`.
     blur_m : float
         Blur of the ridges of a blunt cloud.
@@ -140,6 +140,7 @@ class Standing:
     sharp_m: float = 0.0
     round_m: float = 0.0
     unsure_m: float = 0.0
+    clear_m: float = 0.0
     blur_m: float = 0.0
 
 

@@ -124,6 +124,7 @@ def _standing_figures(standing: Standing, settings: Settings) -> SearchFigures:
         sharp_m=standing.sharp_m,
         round_m=standing.round_m,
         unsure_m=standing.unsure_m,
+        clear_m=standing.clear_m,
     )
 
 

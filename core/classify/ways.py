@@ -1,9 +1,9 @@
 """The way in which a cloud is searched: one for all of it, because it follows from the scanner and the railway.
 
 Rails are the only things of known width. A cloud that shows some of them as narrow as their heads is sharp, unless
-round ones are several times as long, and one that shows round ones only is blunt. One that shows hardly any has tracks
-that are filled with ballast up to the heads, or no tracks. Of several sources, scanners and cameras, each is sharp or
-blunt (docs/classification.md).
+round ones are several times as long, and one that shows round ones only is blunt. One that shows hardly any that stand
+clear of their bed has tracks that are filled with ballast up to the heads, or no tracks. Of several sources, scanners
+and cameras, each is sharp or blunt (docs/classification.md).
 """
 
 from __future__ import annotations
@@ -63,6 +63,11 @@ def is_decided(seen: SearchFigures) -> bool:
     return seen.sharp_m >= SHARP_M or _round_m(seen) >= BLUNT_M
 
 
+def shows_clear(seen: SearchFigures) -> bool:
+    """Return whether rails that stand clear of their bed, or round ones, show that the tracks are not filled."""
+    return seen.clear_m >= SHARP_M or _round_m(seen) >= BLUNT_M
+
+
 def _round_m(seen: SearchFigures) -> float:
     """Return the length of round rails that those which are neither narrow nor round do not outweigh.
 
@@ -114,29 +119,34 @@ def length_m(seen: SearchFigures) -> float:
     return seen.paired_m + seen.single_m
 
 
-def _length_of(answers: Iterable[Answer]) -> float:
-    """Return the length of the rails that were found in some parts."""
-    return length_m(sum((answer.figures for answer in answers), SearchFigures()))
+def _figures_of(answers: Iterable[HasFigures]) -> SearchFigures:
+    """Return the sum of the figures of some parts."""
+    return sum((answer.figures for answer in answers), SearchFigures())
 
 
 def search_alike(parts: Sequence[Part], search: Callable[[Sequence[Part], Way], Iterable[Answer]]) -> Iterator[Answer]:
     """Search all parts of a cloud, those that show most first, in the way that suits it."""
-    seen, done = SearchFigures(), 0
     found: list[Answer] = []
-    while done < len(parts) and not is_decided(seen):
-        batch = parts[done : done + max(done, FIRST_PARTS)]
-        answers = list(search(batch, Way.SHARP))
-        seen = sum((answer.figures for answer in answers), seen)
-        done, found = done + len(batch), found + answers
+
+    def seen_until(enough: Callable[[SearchFigures], bool]) -> SearchFigures:
+        seen = _figures_of(found)
+        while len(found) < len(parts) and not enough(seen):
+            done = len(found)
+            found.extend(search(parts[done : done + max(done, FIRST_PARTS)], Way.SHARP))
+            seen = _figures_of(found)
+        return seen
+
+    seen = seen_until(is_decided)
     if is_blunt(seen):
-        blunt = list(search(parts[:done], Way.BLUNT))
-        if seen.paired_m <= max(_length_of(blunt) / FOUND_AGAIN, SHARP_M):
+        blunt = list(search(parts[: len(found)], Way.BLUNT))
+        if seen.paired_m <= max(length_m(_figures_of(blunt)) / FOUND_AGAIN, SHARP_M):
             yield from blunt
-            yield from search(parts[done:], Way.BLUNT)
+            yield from search(parts[len(found) :], Way.BLUNT)
             return
-    if not is_decided(seen):
-        filled = list(search(parts, Way.FILLED))
-        yield from filled if _length_of(filled) > max(length_m(seen), SHARP_M) else found
-    else:
+    seen = seen_until(shows_clear)
+    if shows_clear(seen):
         yield from found
-        yield from search(parts[done:], Way.SHARP)
+        yield from search(parts[len(found) :], Way.SHARP)
+    else:
+        filled = list(search(parts, Way.FILLED))
+        yield from filled if length_m(_figures_of(filled)) > max(length_m(seen), SHARP_M) else found

@@ -211,7 +211,7 @@ def label_square(
         kept, standing = rails_of(xyz[point], sure, settings, _reach_m(thinned.coarse, point[sure]))
         rail[point[kept]] = True
         figures += replace(standing, blunt_m=by_shape.figures.blunt_m, blur_m2=by_shape.figures.blur_m2)
-    shown = {name: getattr(by_shape.figures, name) for name in ("sharp_m", "round_m", "unsure_m")}
+    shown = {name: getattr(by_shape.figures, name) for name in ("sharp_m", "round_m", "unsure_m", "clear_m")}
     return Classified(rail, replace(figures, points=int(rail.sum()), squares=int(rail.any()), **shown))
 
 

@@ -20,17 +20,17 @@ class Found(NamedTuple):
     figures: SearchFigures
 
 
-def ways(*parts, again=1.0):
+def ways(*parts, again=1.0, clear=1.0):
     """Search parts and return in which way each was searched at last.
 
-    They have lengths of sharp, of round, and of filled rails. Of the round ones, the search of a blunt cloud finds a
-    share.
+    They have lengths of sharp, of round, and of filled rails. Of the sharp ones, a share stands clear of the bed; of
+    the round ones, the search of a blunt cloud finds a share.
     """
 
     def search(some, way):
         for part in some:
             sharp_m, round_m, *filled_m = part
-            seen = SearchFigures(paired_m=sharp_m + round_m, sharp_m=sharp_m, round_m=round_m)
+            seen = SearchFigures(paired_m=sharp_m + round_m, sharp_m=sharp_m, round_m=round_m, clear_m=clear * sharp_m)
             filled, blunt = SearchFigures(paired_m=sum(filled_m)), SearchFigures(paired_m=again * round_m)
             yield Found(part, way, {Way.SHARP: seen, Way.FILLED: filled, Way.BLUNT: blunt}[way])
 
@@ -72,6 +72,14 @@ def test_a_cloud_whose_round_rails_are_no_ridges_of_a_surface_is_sharp(again, wa
 def test_rails_that_may_be_of_either_show_a_sharp_cloud_unless_round_ones_are_longer(round_m, unsure_m, blunt):
     """Grooves may be there by chance, and single metres of a rail may be round."""
     assert is_blunt(SearchFigures(round_m=round_m, unsure_m=unsure_m)) == blunt
+
+
+@pytest.mark.parametrize(
+    ("filled_m", "clear", "way"), [(50.0, 0.1, Way.FILLED), (50.0, 0.9, Way.SHARP), (30.0, 0.1, Way.SHARP)]
+)
+def test_a_cloud_whose_rails_all_stand_low_keeps_the_search_that_finds_more(filled_m, clear, way):
+    """However many they are, others may be lower, and parts of them."""
+    assert ways(*[(40.0, 0.0, filled_m)] * 4, clear=clear) == [way] * 4
 
 
 def test_a_stray_piece_does_not_blunt_a_sharp_cloud():
@@ -146,6 +154,19 @@ def test_heads_just_above_the_ballast_are_above_both_sides_and_as_wide_as_heads(
 def test_beside_a_head_that_stands_low_the_ground_is_lower_by_half_its_height():
     """Beside one of 4.5 cm, no stone is as much below its top as beside one of 15 cm."""
     assert searched(filled_track(0.045, 1500, rough_m=0.01), Way.SHARP).paired_m == pytest.approx(2 * 16.0, abs=1.0)
+
+
+@pytest.mark.parametrize(("rise_m", "clear_m"), [(0.053, 0.0), (0.09, 2 * 16.0)])
+def test_heads_of_which_rough_ballast_would_hide_tops_do_not_stand_clear(rise_m, clear_m):
+    figures = searched(filled_track(rise_m, 1500, rough_m=0.006), Way.SHARP)
+    assert figures.sharp_m == pytest.approx(2 * 16.0, abs=1.0)
+    assert figures.clear_m == pytest.approx(clear_m, abs=1.0)
+
+
+def test_rough_ballast_hides_tops_of_heads_that_do_not_stand_clear():
+    track = filled_track(0.053, 1500, rough_m=0.014)
+    assert searched(track, Way.SHARP).paired_m < 0.25 * 2 * 16.0
+    assert searched(track, Way.FILLED).paired_m == pytest.approx(2 * 16.0, abs=3.0)
 
 
 def test_heads_just_above_the_ballast_are_seen_under_the_vault_of_a_tunnel():
