@@ -69,6 +69,7 @@ def part_branches(network: LineNetwork) -> LineNetwork:
     """
     legs_of = {stem: legs for _, stem, legs in branchings(network)}
     short = network.lengths() < SKIP_M + DIRECTION_M
+    free = network.degrees() == 1
     joins: dict[tuple[int, int], Bridge] = {}
     cuts_m: dict[int, float] = {}
     links: list[int] = []
@@ -79,7 +80,10 @@ def part_branches(network: LineNetwork) -> LineNetwork:
             before = ways.pop(link)
             ways.update({leg: np.concatenate([before[:-1], network.from_end(leg)]) for leg in legs_of[link ^ 1]})
         found = _run_on(network, stem, ways, cuts_m)
-        if found is not None:
+        if short[stem // 2] and free[network.ends.flat[stem ^ 1]]:
+            cuts_m.update(dict.fromkeys(legs, SKIP_M))
+            links.append(stem // 2)
+        elif found is not None:
             back_m, steady, curve = found
             joins[stem, steady] = curve
             cuts_m.update({**dict.fromkeys(ways, SKIP_M), stem: back_m})
