@@ -65,7 +65,8 @@ def part_branches(network: LineNetwork) -> LineNetwork:
     """Let the stem of every branching run on into its steadiest leg, and the other legs end freely.
 
     `attach_branches` leads these back. Where three rails part within a few metres, a line too short for its direction
-    to be measured connects two branchings, which are taken as one. The network has no passes yet.
+    to be measured connects two branchings, which are taken as one. A stem as short that ends freely is dropped: where
+    the cloud ends in a crossing, two rails that do not part are merged in it. The network has no passes yet.
     """
     legs_of = {stem: legs for _, stem, legs in branchings(network)}
     short = network.lengths() < SKIP_M + DIRECTION_M
