@@ -112,7 +112,6 @@ SWITCHES = (
     _rule("heads.head_points.CROSSED_M", np.inf),
     _rule("heads.own_level.DRIFT", 0.0),
     _rule("heads.roads.CLEARLY_M", 0.0),
-    _rule("heads.axis.SHOWN_SHARE", 0.0),
     _rule("heads.axis._either_end", lambda points: np.zeros(len(points.stations))),
     _rule("heads.axis.hidden_edges", lambda points: np.zeros(points.free.shape, dtype=bool)),
     _rule("heads.edges._excess", np.zeros_like),

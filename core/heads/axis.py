@@ -26,10 +26,6 @@ UNSHOWN_M = 0.3
 UNSEEN_TURN = 1e-4
 """Change of the curvature per metre that a rail may have where no point shows it, 1/m²: that of a transition."""
 
-SHOWN_SHARE = 0.25
-"""Points on the head at a station, by their median, from which it shows the head: with fewer, something covers it, and
-the edges that are seen are those of dirt next to it."""
-
 NARROW_SHARE, NARROW_PERCENTILES = 0.25, (5.0, 95.0)
 """Width of a band of points, in head widths and between these percentiles, in which no edges are looked for: points
 that were drawn or computed on the axis, not scanned, all have one offset."""
@@ -152,16 +148,14 @@ def _of_head(points: HeadPoints, unseen_m: float, by_outline: bool) -> Shown:
     on_head, mean_m = _means(top[top.within(0.5)])
     free = points.free & ~hidden_edges(points)
     edge_m, edge_information = edge_middles(points, free)
-    shown, either_end_m = _is_shown(on_head), _either_end(points)
-    by_edges = np.isfinite(edge_m)
-    seen, one_head = by_edges & shown, (by_edges | (either_end_m == 0)) & free.all(axis=0)
+    by_edges, either_end_m = np.isfinite(edge_m), _either_end(points)
     outline = Middles.unknown(len(stations))
     if by_outline:
-        outline = outline_middles(points, shown & one_head)
+        outline = outline_middles(points, (by_edges | (either_end_m == 0)) & free.all(axis=0))
     outlined = np.isfinite(outline.offset)
     wanted = ~outlined & free.all(axis=0)
     beside = beside_faces(points, wanted)
-    which = [outlined, wanted & np.isfinite(beside.offset), seen, on_head > 0]
+    which = [outlined, wanted & np.isfinite(beside.offset), by_edges, on_head > 0]
     unsure_m = np.hypot(unseen_m, either_end_m)
     by_mean = np.full(len(stations), STATION_STEP_M / unseen_m**2)
     return Shown(
@@ -172,12 +166,6 @@ def _of_head(points: HeadPoints, unseen_m: float, by_outline: bool) -> Shown:
         np.select(which, [outline.common, beside.common, EDGE_SIGMA_M, unsure_m]),
         outline,
     )
-
-
-def _is_shown(points: np.ndarray) -> np.ndarray:
-    """Return at which stations the head is shown, (s,) bool, by the number of points on it."""
-    usual = np.median(points[points > 0]) if points.any() else 0.0
-    return points >= SHOWN_SHARE * usual
 
 
 def _either_end(points: HeadPoints) -> np.ndarray:
