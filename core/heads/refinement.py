@@ -24,19 +24,20 @@ from .head_points import HeadPoints, Widths, near_lines, widest
 from .own_level import on_own_level
 from .strips import measure_strips
 
-ROUNDS, SURE_HEADS = 3, 0.7
-"""Rounds of moving lines, and distance of a branch from its stock rail, in head widths, from which most of its head is
-free and its line thus reliable."""
+ROUNDS = 3
+"""Rounds of moving lines."""
 
 ALIGNED_ROUNDS = 2
 """Further rounds in which strips are aligned: a step of 30 mm where strips meet has been drawn as a bend 2 m long, of
 which a round removes half."""
 
-APART_HEADS = 1.3
-"""Distance between two axes, in head widths, from which the raster has a cell between the heads."""
+PARTING = 0.7, 1.3, 3.0
+"""Distances between two axes, in head widths: from which most of the branch's head is free and its line thus reliable;
+from which the raster has a cell between the heads; and up to which the way they part shows where they touch."""
 
-PARTED_HEADS = 3.0
-"""Distance between the axes, in head widths, up to which the way they part shows where they touch."""
+BLUNT_PARTING = 1.5, 1.5, 6.0
+"""The same where heads are blunt: two ridges that are nearer are one, and the line of either is drawn away from the
+other, by 20 mm in images that blur by 4 cm."""
 
 MIN_PART_M = 1.5
 """Shortest part that shows it: an eighth of the length in which the flattest switch opens by the width of a head."""
@@ -77,7 +78,7 @@ def refine(
     shares = progress.split(ROUNDS + (ALIGNED_ROUNDS if align and points.strips is not None else 0))
     for number, share in enumerate(shares[:ROUNDS]):
         network = _shifted(network, points, head_width_m, smoothing_m, cell_m, share, by_outline=number > 0)
-        network = slide_branches(network, by_x, widest(head_width_m), SURE_HEADS * widest(head_width_m))
+        network = slide_branches(network, by_x, widest(head_width_m), bool(points.blunt))
     for share in shares[ROUNDS:]:
         network = _shifted(network, points, head_width_m, smoothing_m, cell_m, share, align=True)
     return network
@@ -126,23 +127,22 @@ def _joined(network: LineNetwork, lines: list[np.ndarray], smoothing_m: float) -
     return replace(network, lines=tuple(lines), nodes=nodes)
 
 
-def slide_branches(network: LineNetwork, xyz: np.ndarray, head_width_m: float, sure_m: float) -> LineNetwork:
+def slide_branches(network: LineNetwork, xyz: np.ndarray, head_width_m: float, blunt: bool = False) -> LineNetwork:
     """Let each branch begin where it touches the rail that it leaves.
 
     The distance between axes that part on an arc grows with the square of the way, that next to a straight blade, as
     American switches have, in proportion to it. Both fit where the heads are apart, but the arc begins metres before
     the blade. Where the points, `xyz` (k, 3) in order of x, show no head next to the stock rail there, it is a blade.
-    Branches that part in any other way stay unchanged. `sure_m` is the distance between the axes from which both lines
-    are reliable.
+    Branches that part in any other way stay unchanged. `blunt` says whether the cloud blunts heads.
     """
-    between_m = sure_m, PARTED_HEADS * head_width_m
+    sure, apart, parted = BLUNT_PARTING if blunt else PARTING
+    between_m, apart_m = ((start * head_width_m, parted * head_width_m) for start in (sure, apart))
     starts = [
         (number, end)
         for number, (node, stock, _) in enumerate(network.passes.tolist())
         for end in np.flatnonzero(network.ends.ravel() == node).tolist()
         if end // 2 != stock
     ]
-    apart_m = APART_HEADS * head_width_m, between_m[1]
     partings = [_parting(network, end, number, apart_m) for number, end in starts]
     counts = [np.zeros(2) if one is None else _points_of_arc(network, one, xyz, head_width_m) for one in partings]
     for (number, end), count in zip(starts, counts):
