@@ -16,7 +16,7 @@ from scipy.ndimage import median_filter, percentile_filter
 from ..lines.smoothing import smooth_profile
 from .head_points import MIN_ON_HEAD, HeadPoints
 from .level import MIN_NOISE_M, rough_level
-from .outline import CORNER_RADIUS_M, FACE_DEPTH_M, Grid, Outline, fit_section, log_likelihood
+from .outline import CORNER_RADIUS_M, FACE_DEPTH_M, WEB_TO_M, Grid, Outline, fit_section, log_likelihood
 from .sections import MIN_SECTION_POINTS, borders
 
 MAX_BAND_SHARE, BAND_PERCENTILES = 0.4, (5.0, 95.0)
@@ -46,9 +46,10 @@ LEAST_POINTS, SECTION_POINTS = 30, 60
 """Points from which a head is looked for, and points of a section. On far rails of random worlds, the logarithms of the
 likelihoods of the two sides differ by 4 to 27 with 30 points, by 5 to 100 with 60."""
 
-WEB_DEPTH_M, ABOVE_M = 0.045, 0.03
-"""Depth below the highest points of a line from which points are on the web below the head, whose faces end 40 mm below
-the top; and height above them from which points are of weeds."""
+WEB_DEPTH_M, USED_DEPTH_M, ABOVE_M = 0.045, 0.08, 0.03
+"""Depths below the highest points of a line from which points are on the web below the head, whose faces end 40 mm
+below the top, and down to which those on the web are used: the highest points are up to 20 mm below the top. Height
+above them from which points are of weeds."""
 
 PROFILE_M = 5.0
 """Sigma of PAEK for the mean height along a line, above which the highest points around each are found."""
@@ -144,28 +145,33 @@ def beside_faces(points: HeadPoints, wanted: np.ndarray) -> Beside:
     """Find the axis by the points of each section of a line that has `wanted` stations, (s,) bool.
 
     Where points are many, sections show their outline, or something that is not a head alone. A scanner passes a rail
-    on one side: sections whose points may be on either face follow those that show which one they are on.
+    on one side: all sections of a line together show which one it is.
     """
     found = Beside(*np.full((3, len(wanted)), np.nan))
     if len(points.t) < LEAST_POINTS:
         return found
     points, up = _as_high(points)
-    off_band = points.across - band_of(points)
+    high = up > -WEB_DEPTH_M
+    head = points[high]
+    if not high.any():
+        return found
+    off_band = points.across - np.interp(points.t, head.t, band_of(head))
+    up -= np.median(up[high])
     parts, own = [], []
-    for first, last in borders(points.station, len(wanted), SECTION_POINTS):
+    for first, last in borders(head.station, len(wanted), SECTION_POINTS):
         start, end = np.searchsorted(points.station, [first, last])
-        if wanted[first:last].any() and end - start < MIN_SECTION_POINTS:
+        if wanted[first:last].any() and np.count_nonzero(high[start:end]) < MIN_SECTION_POINTS:
             parts.append(slice(first, last))
             own.append(np.arange(start, end))
     fits = [_fits(off_band[mine], up[mine], points.width_m) for mine in own]
     usual = _side_of(fits)
     for part, mine, tried in zip(parts, own, fits):
         likely = _likely(tried, usual)
-        if not likely[0].shows_side:
+        if not likely or not likely[0].shows_side:
             continue
         left_m, found.common[part] = _axis(likely, points.width_m)
         on_head = np.abs(off_band[mine] - left_m) < 0.5 * points.width_m + NEAR_HEAD_M
-        on_head &= up[mine] < likely[0].top_m + NEAR_HEAD_M
+        on_head &= np.abs(up[mine] - likely[0].top_m + 0.5 * FACE_DEPTH_M) < 0.5 * FACE_DEPTH_M + NEAR_HEAD_M
         mean_m, found.information[part] = _by_station(points[mine[on_head]], part, off_band[mine][on_head])
         found.offset[part] = mean_m + left_m
     return found
@@ -187,14 +193,15 @@ def _by_station(points: HeadPoints, part: slice, off_band: np.ndarray) -> tuple[
 
 
 def _as_high(points: HeadPoints) -> tuple[HeadPoints, np.ndarray]:
-    """Return the points of a line that are as high as its head, and by how much they are above most of these, (n,).
+    """Return the points of a line that are on its head or on the web below, and their heights above the highest, (n,).
 
     A class of whole rails shows the web as well: it is 3 cm beside the face that the scanner sees, below the axis.
     """
     up = points.z - smooth_profile(points.t, points.z, PROFILE_M, points.t)
-    up -= percentile_filter(up, HIGHEST_PERCENT, min(BAND_POINTS, len(up)), mode="nearest")
-    head = (up > -WEB_DEPTH_M) & (up < ABOVE_M)
-    return points[head], up[head] - np.median(up[head])
+    highest = percentile_filter(up, HIGHEST_PERCENT, min(BAND_POINTS, len(up)), mode="nearest")
+    up -= smooth_profile(points.t, highest, PROFILE_M, points.t)
+    rail = (up > -USED_DEPTH_M) & (up < ABOVE_M)
+    return points[rail], up[rail]
 
 
 def _fits(across: np.ndarray, up: np.ndarray, head_width_m: float) -> list[_Fit]:
@@ -202,7 +209,8 @@ def _fits(across: np.ndarray, up: np.ndarray, head_width_m: float) -> list[_Fit]
 
     The likeliest fit comes first. So few points do not distinguish a line of sight behind an edge from a face.
     """
-    grid, outline, half_m = Grid.of(head_width_m), Outline.of(head_width_m, rays_deg=()), 0.5 * head_width_m
+    half_m = 0.5 * head_width_m
+    grid, outline = Grid.of(head_width_m, WEB_TO_M), Outline.of(head_width_m, rays_deg=(), web=True)
     fits = []
     for left_m, top_m in ((0.0, 0.0), (-half_m, TOP_ABOVE_M), (half_m, TOP_ABOVE_M)):
         bins = grid.number(across - left_m, up - top_m)
@@ -212,7 +220,8 @@ def _fits(across: np.ndarray, up: np.ndarray, head_width_m: float) -> list[_Fit]
         likelihood = log_likelihood(counts, section, outline, grid) + outside * np.log(stray / grid.size)
         axis_m = left_m + float(section.place[0])
         side = int(np.sign(axis_m)) if abs(axis_m) > OFF_AXIS * head_width_m else 0
-        beside = np.mean(-side * (across - axis_m) >= half_m - CORNER_RADIUS_M) if side else 0.0
+        head = up > top_m + section.place[1] - FACE_DEPTH_M - NEAR_HEAD_M
+        beside = np.mean(-side * (across[head] - axis_m) >= half_m - CORNER_RADIUS_M) if side and head.any() else 0.0
         shares = (outside + stray * counts.sum()) / len(up), float(beside)
         noise_m = float(np.exp(section.place[4:6].max()))
         fits.append(_Fit(likelihood, axis_m, top_m + float(section.place[1]), side, *shares, noise_m))
@@ -220,9 +229,9 @@ def _fits(across: np.ndarray, up: np.ndarray, head_width_m: float) -> list[_Fit]
 
 
 def _likely(fits: Sequence[_Fit], usual: int = 0) -> list[_Fit]:
-    """Return the fits that are about as likely as the first one; of those on both sides, those on the `usual` one."""
-    likely = [fit for fit in fits if fit.likelihood > fits[0].likelihood - MIN_GAIN]
-    return [fit for fit in likely if fit.side == usual] if usual and _on_both_sides(likely) else likely
+    """Return the fits that are about as likely as the first one, of those that are not on the side opposite `usual`."""
+    fits = [fit for fit in fits if not usual or fit.side != -usual]
+    return [fit for fit in fits if fit.likelihood > fits[0].likelihood - MIN_GAIN]
 
 
 def _on_both_sides(fits: Sequence[_Fit]) -> bool:
@@ -238,6 +247,9 @@ def _axis(likely: Sequence[_Fit], head_width_m: float) -> tuple[float, float]:
 
 
 def _side_of(sections: Sequence[Sequence[_Fit]]) -> int:
-    """Return on which side of the points the axis is in most sections of a line that show it; 0 if there is none."""
-    sure = [likely for likely in map(_likely, sections) if not _on_both_sides(likely)]
-    return int(np.sign(sum(likely[0].side for likely in sure)))
+    """Return on which side of the points the axis of a line is by all its sections; 0 if they do not decide."""
+    gain = 0.0
+    for fits in sections:
+        right, left = ([fit.likelihood for fit in fits if fit.side == side] for side in (-1, 1))
+        gain += max(left) - max(right) if left and right else 0.0
+    return int(np.sign(gain)) if abs(gain) > MIN_GAIN else 0

@@ -22,6 +22,10 @@ FACE_DEPTH_M = 0.0375
 """Depth of the lower end of the faces below the top: that of 60E1 (EN 13674-1). Points further down than the model's
 face draw the axis towards the scanner, 0.7 mm where they reach 2.5 mm further; a face that ends sooner does not."""
 
+WEB_HALF_M, WEB_FROM_M, WEB_TO_M = 0.008, 0.048, 0.1
+"""Half the thickness of the web, and depths below the top of its upper end and of what is used of it: 16.5 mm on 60E1,
+where the underside of the head, which no scanner above the rail sees, meets it 10 mm below the faces."""
+
 FACE_TURN = np.pi / 4
 """Angle between the axis and the normal of the surface from which a classification may leave the surface out."""
 
@@ -115,8 +119,11 @@ class Outline:
     parts: np.ndarray
 
     @classmethod
-    def of(cls, head_width_m: float, rays_deg: Sequence[float] = RAYS_DEG) -> Outline:
-        """Sample the outline of a head. Rays at equal angles meet a surface in proportion to how it faces them."""
+    def of(cls, head_width_m: float, rays_deg: Sequence[float] = RAYS_DEG, web: bool = False) -> Outline:
+        """Sample the outline of a head, or with its `web` as the last parts.
+
+        Rays at equal angles meet a surface in proportion to how it faces them.
+        """
         half = 0.5 * head_width_m
         inner, reach = half - CORNER_RADIUS_M, CROWN_RADIUS_M - CORNER_RADIUS_M
         shoulder = np.arcsin(inner / reach)
@@ -134,6 +141,7 @@ class Outline:
                 level = np.full(len(down), side * 0.5 * np.pi)
                 pieces.append((np.full(len(down), side * half), -down, level, size))
         rays = [_behind(side, np.radians(ray), inner, drop) for side in (-1, 1) for ray in rays_deg]
+        rays += [_web(side) for side in (-1, 1)] if web else []
         left, up, turn, size = (np.concatenate(column) for column in zip(*pieces, *rays))
         number = np.repeat(np.arange(len(pieces) + len(rays)), [len(piece[0]) for piece in pieces + rays])
         seen = np.sin(np.radians(VIEWS_DEG)[:, None] + turn) * size
@@ -155,6 +163,12 @@ def _behind(side: int, ray: float, inner: float, drop: float) -> tuple[np.ndarra
     return side * left, up, np.full(len(away), side * 0.5 * np.pi), step
 
 
+def _web(side: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Sample one side of the web; see `_behind`."""
+    down, size = _samples(WEB_FROM_M, WEB_TO_M, 1.0)
+    return np.full(len(down), side * WEB_HALF_M), -down, np.full(len(down), side * 0.5 * np.pi), size
+
+
 def _samples(first: float, last: float, metres: float) -> tuple[np.ndarray, np.ndarray]:
     """Divide a range into equal pieces: their middles and their lengths in metres."""
     borders = np.linspace(first, last, max(int(np.ceil((last - first) * metres / SAMPLE_M)), 2) + 1)
@@ -169,10 +183,10 @@ class Grid:
     up: np.ndarray
 
     @classmethod
-    def of(cls, head_width_m: float) -> Grid:
-        """Lay out the bins for a head."""
+    def of(cls, head_width_m: float, below_m: float = BELOW_M) -> Grid:
+        """Lay out the bins for a head, `below_m` deep."""
         reach = 0.5 * head_width_m + BESIDE_M
-        return cls(_bins(-reach, reach), _bins(-BELOW_M, ABOVE_M))
+        return cls(_bins(-reach, reach), _bins(-below_m, ABOVE_M))
 
     def number(self, left: np.ndarray, up: np.ndarray) -> np.ndarray:
         """Return the number of the bin of each point, (n,), and -1 for those outside."""

@@ -109,6 +109,23 @@ def test_the_web_below_a_far_head_is_not_taken_for_the_rest_of_it(seed):
     assert np.sqrt(np.mean(off_m**2)) < 0.010
 
 
+@pytest.mark.parametrize("mirror", [-1, 1])
+@pytest.mark.parametrize("seed", [2, 4])
+def test_the_web_shows_on_which_side_of_the_face_the_axis_is(seed, mirror):
+    """In worlds 10575 and 10731, a face and the upper end of its web were taken for the crown and the other face."""
+    rng, count, length_m = np.random.default_rng(seed), 145, 110.0
+    t, across, up = seen_from_right(count, length_m, seed, corner=0.2)
+    web = np.array([np.full(count, -0.008), -rng.uniform(0.045, 0.11, count)])
+    noise = rng.normal(0, 0.004, (2, 2 * count))
+    t = np.append(t, rng.uniform(0, length_m, count))
+    wander_m = 0.036 + 0.02 * np.sin(t / 12)
+    across = np.append(across, web[0]) + noise[0] + wander_m
+    axis = Axis.of(along(t, mirror * across, np.append(up, web[1]) + noise[1], length_m), UNSEEN, by_outline=False)
+    stations = np.arange(5.0, 105.0)
+    off_m = axis.course.at(stations) - mirror * (0.036 + 0.02 * np.sin(stations / 12))
+    assert np.sqrt(np.mean(off_m**2)) < 0.010
+
+
 def test_scattered_points_show_no_head():
     """In world 8109, 50 points of ballast along a rail that nobody sees were taken for one."""
     rng = np.random.default_rng(0)

@@ -109,3 +109,12 @@ def test_points_at_one_place_break_nothing(left, up):
     counts, section, outline, grid = fitted(np.full(500, left), np.full(500, up))
     assert np.isfinite(section.place).all()
     assert np.isfinite(Scores.of(counts, section, outline, grid).by_bin).all()
+
+
+def test_the_web_is_below_the_axis_and_a_part_of_its_own():
+    head, rail = Outline.of(WIDTH, rays_deg=()), Outline.of(WIDTH, rays_deg=(), web=True)
+    assert len(rail.parts) == len(head.parts) + 2
+    assert np.allclose(rail.parts.sum(axis=1), 1.0)
+    for part, side in zip(rail.parts[-2:], (-1, 1)):
+        assert np.allclose(rail.left[part > 0], side * 0.008)
+        assert rail.up[part > 0].max() < head.up.min() - 0.01
