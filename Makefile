@@ -55,7 +55,7 @@ golden-all: .venv/installed  ## compare every scene with its figures, with the b
 
 .PHONY: ablation
 ablation: .venv/installed  ## switch rules off one at a time, and print which golden figures need each; RULES=tracks. chooses, WORLDS=200 asks worlds
-	@PYTHONPATH=$(AS_PACKAGE) $(PYTHON) $(if $(WORLDS),benchmarks/ablation_of_worlds.py --count $(WORLDS),benchmarks/ablation.py) $(if $(FROM),--from $(FROM)) $(if $(KIND),--kind $(KIND)) $(RULES)
+	@PYTHONPATH=$(AS_PACKAGE) $(PYTHON) $(if $(WORLDS),benchmarks/ablation_of_worlds.py --count $(WORLDS) $(if $(FROM),--from $(FROM)) $(if $(KIND),--kind $(KIND)),benchmarks/ablation.py) $(RULES)
 
 .PHONY: worlds
 worlds: .venv/installed  ## extract COUNT=100 worlds drawn at random, from seed FROM=1, raw and classified; SEED=7 draws one

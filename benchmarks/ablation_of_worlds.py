@@ -2,8 +2,8 @@
 
 Run `python benchmarks/ablation_of_worlds.py --from 1 --count 200 --jobs 2 [--kind raw] [RULE ...]`. Each world appends
 a line of JSON to `build/ablation/raw.jsonl` or `classified.jsonl`: whether it fails with all rules, and without each of
-those that act in it. Worlds that are there already, run by the same code, are not run again. McNemar's exact test says
-whether the difference is more than chance; a rule for which it says so is not asked in further worlds.
+those that act in it. What the same code has asked a world is not asked again, and counts in the table. McNemar's exact
+test says whether the difference is more than chance; further worlds are not asked for a rule for which it is.
 """
 
 from __future__ import annotations
@@ -73,24 +73,41 @@ def main() -> None:
 
 
 def collect(seeds: Sequence[int], kind: str, names: Sequence[str], path: Path, jobs: int) -> list[Line]:
-    """Ablate the worlds that this code has not ablated yet, append their lines to the file, and return all lines."""
-    code = fingerprint()
-    ours = {"kind": kind, "version": VERSION, "code": code}
-    known = {line["seed"]: line for line in written(path) if ours.items() <= line.items()}
-    missing = [seed for seed in seeds if seed not in known]
+    """Ask each world for the rules that it was not asked for yet; returns what is known of all worlds, old ones too.
+
+    Each world that is asked appends a line to the file.
+    """
+    ours = {"kind": kind, "version": VERSION, "code": fingerprint()}
+    known: dict[int, Line] = {}
+    for line in written(path):
+        if ours.items() <= line.items():
+            known[line["seed"]] = _with(known.get(line["seed"]), line)
     with processes(jobs) as pool, path.open("a", encoding="utf-8") as file:
-        for start in range(0, len(missing), jobs):
-            asked = undecided(names, list(known.values()))
-            tasks = [(seed, kind, asked) for seed in missing[start : start + jobs]]
-            for result in pool.map(ablate, tasks):
-                line = {**ours, **result}
-                known[line["seed"]] = line
-                file.write(json.dumps(line) + "\n")
+        for start in range(0, len(seeds), jobs):
+            wanted = undecided(names, list(known.values()))
+            asked = {
+                seed: [name for name in wanted if seed not in known or name not in known[seed]["asked"]]
+                for seed in seeds[start : start + jobs]
+            }
+            for line in pool.map(ablate, [(seed, kind, some) for seed, some in asked.items() if some]):
+                known[line["seed"]] = _with(known.get(line["seed"]), line)
+                file.write(json.dumps({**ours, **line}) + "\n")
                 file.flush()
                 decided = [name for name, fails in line["without"].items() if fails != line["fails"]]
                 words = f"{'fails' if line['fails'] else 'right'}, {', '.join(decided) or 'whatever is off'}"
                 print(f"{kind} world {line['seed']}: {words}", file=sys.stderr, flush=True)
-    return [known[seed] for seed in seeds]
+    return list(known.values())
+
+
+def _with(earlier: Line | None, line: Line) -> Line:
+    """Add what was asked of a world earlier."""
+    if earlier is None:
+        return line
+    return {
+        **line,
+        "asked": [*earlier["asked"], *line["asked"]],
+        "without": {**earlier["without"], **line["without"]},
+    }
 
 
 def ablate(task: tuple[int, str, Sequence[str]]) -> dict[str, Any]:

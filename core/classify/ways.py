@@ -127,26 +127,29 @@ def _figures_of(answers: Iterable[HasFigures]) -> SearchFigures:
 def search_alike(parts: Sequence[Part], search: Callable[[Sequence[Part], Way], Iterable[Answer]]) -> Iterator[Answer]:
     """Search all parts of a cloud, those that show most first, in the way that suits it."""
     found: list[Answer] = []
+    done = 0  # parts, of which some may have failed: there are no answers for these
 
     def seen_until(enough: Callable[[SearchFigures], bool]) -> SearchFigures:
+        nonlocal done
         seen = _figures_of(found)
-        while len(found) < len(parts) and not enough(seen):
-            done = len(found)
-            found.extend(search(parts[done : done + max(done, FIRST_PARTS)], Way.SHARP))
+        while done < len(parts) and not enough(seen):
+            batch = parts[done : done + max(done, FIRST_PARTS)]
+            found.extend(search(batch, Way.SHARP))
+            done += len(batch)
             seen = _figures_of(found)
         return seen
 
     seen = seen_until(is_decided)
     if is_blunt(seen):
-        blunt = list(search(parts[: len(found)], Way.BLUNT))
+        blunt = list(search(parts[:done], Way.BLUNT))
         if seen.paired_m <= max(length_m(_figures_of(blunt)) / FOUND_AGAIN, SHARP_M):
             yield from blunt
-            yield from search(parts[len(found) :], Way.BLUNT)
+            yield from search(parts[done:], Way.BLUNT)
             return
     seen = seen_until(shows_clear)
     if shows_clear(seen):
         yield from found
-        yield from search(parts[len(found) :], Way.SHARP)
+        yield from search(parts[done:], Way.SHARP)
     else:
         filled = list(search(parts, Way.FILLED))
         yield from filled if length_m(_figures_of(filled)) > max(length_m(seen), SHARP_M) else found

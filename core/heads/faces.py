@@ -133,7 +133,7 @@ def find_flank(points: HeadPoints) -> Flank | None:
     if top - bottom < high - low + MIN_HEIGHT_M or top - bottom > 2 * FACE_DEPTH_M:
         return None
     middle = float(np.median(across))
-    likely = _likely(_fits(across - middle, up, head_width_m))
+    likely = _likely(_fits(across - middle, up, head_width_m), side=0)
     if any(fit.side == 0 for fit in likely):
         return None
     best = likely[0]
@@ -145,12 +145,12 @@ def beside_faces(points: HeadPoints, wanted: np.ndarray) -> Beside:
     """Find the axis by the points of each section of a line that has `wanted` stations, (s,) bool.
 
     Where points are many, sections show their outline, or something that is not a head alone. A scanner passes a rail
-    on one side: all sections of a line together show which one it is.
+    on one side for a while: each section and its neighbours together show which one it is.
     """
     found = Beside(*np.full((3, len(wanted)), np.nan))
     if len(points.t) < LEAST_POINTS:
         return found
-    points, up = _as_high(points)
+    points, up = _of_rail(points)
     high = up > -WEB_DEPTH_M
     head = points[high]
     if not high.any():
@@ -164,9 +164,8 @@ def beside_faces(points: HeadPoints, wanted: np.ndarray) -> Beside:
             parts.append(slice(first, last))
             own.append(np.arange(start, end))
     fits = [_fits(off_band[mine], up[mine], points.width_m) for mine in own]
-    usual = _side_of(fits)
-    for part, mine, tried in zip(parts, own, fits):
-        likely = _likely(tried, usual)
+    for part, mine, tried, side in zip(parts, own, fits, _sides(fits)):
+        likely = _likely(tried, side)
         if not likely or not likely[0].shows_side:
             continue
         left_m, found.common[part] = _axis(likely, points.width_m)
@@ -192,7 +191,7 @@ def _by_station(points: HeadPoints, part: slice, off_band: np.ndarray) -> tuple[
     return mean_m - np.mean(off_band), count / max(np.var(off_band), MIN_NOISE_M**2)
 
 
-def _as_high(points: HeadPoints) -> tuple[HeadPoints, np.ndarray]:
+def _of_rail(points: HeadPoints) -> tuple[HeadPoints, np.ndarray]:
     """Return the points of a line that are on its head or on the web below, and their heights above the highest, (n,).
 
     A class of whole rails shows the web as well: it is 3 cm beside the face that the scanner sees, below the axis.
@@ -228,9 +227,9 @@ def _fits(across: np.ndarray, up: np.ndarray, head_width_m: float) -> list[_Fit]
     return sorted(fits, key=lambda fit: -fit.likelihood)
 
 
-def _likely(fits: Sequence[_Fit], usual: int = 0) -> list[_Fit]:
-    """Return the fits that are about as likely as the first one, of those that are not on the side opposite `usual`."""
-    fits = [fit for fit in fits if not usual or fit.side != -usual]
+def _likely(fits: Sequence[_Fit], side: int) -> list[_Fit]:
+    """Return the fits that are about as likely as the likeliest, without those on the side opposite `side`."""
+    fits = [fit for fit in fits if not side or fit.side != -side]
     return [fit for fit in fits if fit.likelihood > fits[0].likelihood - MIN_GAIN]
 
 
@@ -246,10 +245,16 @@ def _axis(likely: Sequence[_Fit], head_width_m: float) -> tuple[float, float]:
     return likely[0].left_m, float(np.hypot(FLANK_SIGMA_M, np.ptp([fit.left_m for fit in likely])))
 
 
-def _side_of(sections: Sequence[Sequence[_Fit]]) -> int:
-    """Return on which side of the points the axis of a line is by all its sections; 0 if they do not decide."""
-    gain = 0.0
-    for fits in sections:
+def _sides(sections: Sequence[Sequence[_Fit]]) -> np.ndarray:
+    """Return on which side of the points the axis is in each section, (n,), 1 for the left; 0 if that is not decided.
+
+    A section counts in full, and its neighbours by half.
+    """
+    gains = np.zeros(len(sections))
+    for number, fits in enumerate(sections):
         right, left = ([fit.likelihood for fit in fits if fit.side == side] for side in (-1, 1))
-        gain += max(left) - max(right) if left and right else 0.0
-    return int(np.sign(gain)) if abs(gain) > MIN_GAIN else 0
+        gains[number] = max(left) - max(right) if left and right else 0.0
+    together = gains.copy()
+    together[1:] += gains[:-1] / 2
+    together[:-1] += gains[1:] / 2
+    return np.where(np.abs(together) > MIN_GAIN, np.sign(together), 0).astype(int)

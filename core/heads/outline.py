@@ -23,8 +23,8 @@ FACE_DEPTH_M = 0.0375
 face draw the axis towards the scanner, 0.7 mm where they reach 2.5 mm further; a face that ends sooner does not."""
 
 WEB_HALF_M, WEB_FROM_M, WEB_TO_M = 0.008, 0.048, 0.1
-"""Half the thickness of the web, and depths below the top of its upper end and of what is used of it: 16.5 mm on 60E1,
-where the underside of the head, which no scanner above the rail sees, meets it 10 mm below the faces."""
+"""Half the thickness of the web, which is 16.5 mm on 60E1, and depths below the top of its upper end and of what is
+used of it: the underside of the head, which no scanner above the rail sees, meets it 10 mm below the faces."""
 
 FACE_TURN = np.pi / 4
 """Angle between the axis and the normal of the surface from which a classification may leave the surface out."""
@@ -109,7 +109,7 @@ class Outline:
     if the head is a metre wider, `falling` how far it falls per bend of the crown, m². `parts`, (k, j), are the points
     of each part by sample; rows sum to 1. The first parts are what is seen of the crown and the upper corners from each
     view. Those of `FACES` are the lower corners and the faces, which classifications may leave out. The last ones are
-    lines of sight behind either edge, which are on no part of the head.
+    lines of sight behind either edge, which are on no part of the head, and the sides of the web, if it is asked for.
     """
 
     left: np.ndarray

@@ -65,12 +65,13 @@ def part_branches(network: LineNetwork) -> LineNetwork:
     """Let the stem of every branching run on into its steadiest leg, and the other legs end freely.
 
     `attach_branches` leads these back. Where three rails part within a few metres, a line too short for its direction
-    to be measured connects two branchings, which are taken as one. A stem as short that ends freely is dropped: where
-    the cloud ends in a crossing, two rails that do not part are merged in it. The network has no passes yet.
+    to be measured connects two branchings, which are taken as one. A stem as short that ends freely is dropped where
+    its legs are straight: the cloud ends in a crossing, and the two rails are merged in the stem. The network has no
+    passes yet.
     """
     legs_of = {stem: legs for _, stem, legs in branchings(network)}
     short = network.lengths() < SKIP_M + DIRECTION_M
-    free = network.degrees() == 1
+    blind = {stem for stem in legs_of if short[stem // 2] and network.degrees()[network.ends.flat[stem ^ 1]] == 1}
     joins: dict[tuple[int, int], Bridge] = {}
     cuts_m: dict[int, float] = {}
     links: list[int] = []
@@ -81,14 +82,14 @@ def part_branches(network: LineNetwork) -> LineNetwork:
             before = ways.pop(link)
             ways.update({leg: np.concatenate([before[:-1], network.from_end(leg)]) for leg in legs_of[link ^ 1]})
         found = _run_on(network, stem, ways, cuts_m)
-        if short[stem // 2] and free[network.ends.flat[stem ^ 1]]:
-            cuts_m.update(dict.fromkeys(legs, SKIP_M))
-            links.append(stem // 2)
-        elif found is not None:
+        if found is not None:
             back_m, steady, curve = found
             joins[stem, steady] = curve
             cuts_m.update({**dict.fromkeys(ways, SKIP_M), stem: back_m})
             links += [link // 2 for link in through]
+        elif stem in blind and not short[[leg // 2 for leg in legs]].any() and _cross(*ways.values()):
+            cuts_m.update(dict.fromkeys(legs, SKIP_M))
+            links.append(stem // 2)
     return network.bridged(joins, cuts_m, links)
 
 
@@ -117,10 +118,20 @@ def _run_on(
 
 def _merged_m(one: np.ndarray, other: np.ndarray) -> float:
     """Measure how far before their node two legs begin to part; not positive if they do not."""
+    return -PartingLaw.fitted(*_apart(one, other), ARC).way_at(MISFIT_M)
+
+
+def _cross(one: np.ndarray, other: np.ndarray) -> bool:
+    """Return whether two legs are those of a crossing: they are straight, at an angle to each other."""
+    way, apart = _apart(one, other)
+    return _is_straight(way, apart, PartingLaw.fitted(way, apart, ARC))
+
+
+def _apart(one: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the way along two legs from their node and the distance between them, (n,) metres each."""
     one, other = (even_points(cut_back(way, SKIP_M), STEADY_M) for way in (one, other))
     count = min(len(one), len(other))
-    apart_m = np.hypot(*(one[:count] - other[:count]).T)
-    return -PartingLaw.fitted(SKIP_M + STEP_M * np.arange(count), apart_m, ARC).way_at(MISFIT_M)
+    return SKIP_M + STEP_M * np.arange(count), np.hypot(*(one[:count] - other[:count]).T)
 
 
 def attach_branches(network: LineNetwork, seen: cKDTree, max_gap_m: float, progress: Progress = SILENT) -> LineNetwork:
@@ -187,11 +198,14 @@ def _is_leg(way: np.ndarray, apart: np.ndarray, arc: PartingLaw) -> bool:
 
     `way` and `apart`, (n,), are the way along the rail from the line's end and the distance between both there.
     """
+    return bool(apart[0] > PARTED_M) and _is_straight(way, apart, arc)
+
+
+def _is_straight(way: np.ndarray, apart: np.ndarray, arc: PartingLaw) -> bool:
+    """Return whether two lines part at an angle, and a straight line explains their distance better than an arc."""
     straight = PartingLaw.fitted(way, apart, STRAIGHT)
-    if apart[0] <= PARTED_M or straight.slope <= np.tan(np.radians(MIN_ANGLE_DEG)):
-        return False
     of_arc, of_straight = (np.std(law(way) - apart) for law in (arc, straight))
-    return bool(of_straight < STRAIGHTER * of_arc)
+    return bool(straight.slope > np.tan(np.radians(MIN_ANGLE_DEG)) and of_straight < STRAIGHTER * of_arc)
 
 
 def choose_routes(network: LineNetwork) -> LineNetwork:

@@ -82,6 +82,20 @@ def test_a_cloud_whose_rails_all_stand_low_keeps_the_search_that_finds_more(fill
     assert ways(*[(40.0, 0.0, filled_m)] * 4, clear=clear) == [way] * 4
 
 
+@pytest.mark.parametrize("lost", [0, 1, 4])
+@pytest.mark.parametrize("round_m", [0.0, 66.0])
+def test_parts_that_cannot_be_searched_are_left_out_once(lost, round_m):
+    """A tolerant run notes their errors and has no answer for them."""
+
+    def search(some, way):
+        for number in some:
+            if number != lost:
+                figures = SearchFigures(paired_m=round_m, round_m=round_m)
+                yield Found(number, way, figures)
+
+    assert [one.part for one in search_alike(range(5), search)] == [number for number in range(5) if number != lost]
+
+
 def test_a_stray_piece_does_not_blunt_a_sharp_cloud():
     scene = RAW_SCENES["thin ballast"](1)
     found, rail = score(scene)

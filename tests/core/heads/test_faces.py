@@ -126,6 +126,19 @@ def test_the_web_shows_on_which_side_of_the_face_the_axis_is(seed, mirror):
     assert np.sqrt(np.mean(off_m**2)) < 0.010
 
 
+@pytest.mark.parametrize(("first", "second"), [(300, 300), (400, 150), (800, 80)])
+def test_a_far_rail_may_be_seen_from_one_side_and_then_from_the_other(first, second):
+    """Two places of a tripod are on either side of a track: each part is drawn from its own face."""
+    (t1, across1, up1), (t2, across2, up2) = (seen_from_right(count, count / 2, 3) for count in (first, second))
+    length_m = (first + second) / 2
+    t, across, up = np.append(t1, t2 + first / 2), np.append(across1, -across2), np.append(up1, up2)
+    points = along(t, across, up, length_m)
+    found = beside_faces(points, np.ones(len(points.stations), dtype=bool))
+    off_m = np.abs(found.offset)
+    for part in (points.stations < first / 2, points.stations > first / 2):
+        assert np.nanmedian(off_m[part]) < 0.010
+
+
 def test_scattered_points_show_no_head():
     """In world 8109, 50 points of ballast along a rail that nobody sees were taken for one."""
     rng = np.random.default_rng(0)

@@ -53,15 +53,20 @@ def test_the_stem_of_branchings_one_after_another_runs_on_through_both():
     assert np.abs(through[:, 1]).max() < 0.02
 
 
-def test_rails_that_cross_where_the_cloud_ends_are_not_led_to_each_other():
+@pytest.mark.parametrize(("slope", "radius", "dropped"), [(0.13, np.inf, True), (0.0, 190.0, False)])
+def test_rails_that_cross_where_the_cloud_ends_are_not_led_to_each_other(slope, radius, dropped):
     """In worlds 10187 and 10718 the cloud ended 2 m behind the crossing, before the other two legs were seen."""
     x = np.arange(0, 40, 0.1)
-    rails = [np.column_stack([x, (x - 1.3) * slope]) for slope in (0.0, 0.13)]
+    begin = 1.3 if dropped else 2.8 - np.sqrt(2 * radius * 0.2)
+    rails = [np.column_stack([x, y]) for y in (0.0 * x, slope * (x - begin) + (x - begin) ** 2 / (2 * radius))]
     fork = np.array([[2.8, 0.1]])
-    stem = np.concatenate([np.column_stack([x, (x - 1.3) * 0.065])[x < 2.8], fork])
+    stem = np.concatenate([((rails[0] + rails[1]) / 2)[x < 2.8], fork])
     lines = (stem, *(np.concatenate([fork, rail[x > 2.9]]) for rail in rails))
     nodes = np.concatenate([fork, stem[:1], *(line[-1:] for line in lines[1:])])
     network = part_branches(LineNetwork(lines, nodes, np.array([[1, 0], [0, 2], [0, 3]])))
+    if not dropped:
+        assert sorted(network.degrees().tolist()) == [1, 1, 1, 3]
+        return
     network = attach_branches(network, cKDTree(np.concatenate([stem, *rails])), 5.0)
     assert network.degrees().tolist() == [1] * 4
     assert len(network.passes) == 0
