@@ -42,8 +42,8 @@ other, by 20 mm in images that blur by 4 cm."""
 MIN_PART_M = 1.5
 """Shortest part that shows it: an eighth of the length in which the flattest switch opens by the width of a head."""
 
-MAX_BACK_M = 25.0
-"""No branch touches its stock rail further than this before the heads are apart."""
+MAX_BACK_M = 35.0
+"""No branch touches its stock rail further than this before both lines are reliable: at 1.5 heads, radii of 5000 m."""
 
 HEEL_SPREAD_M = 0.15
 """Distance between the axes up to which a blade is straight: at the heels of American switches it is 6 1/4 inches."""
