@@ -6,6 +6,7 @@ See docs/method.md sections 4.10 and 4.11.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -53,6 +54,10 @@ line that ends further from a rail was not seen to leave it: if it is straight, 
 STRAIGHTER = 0.9
 """Scatter about a straight line, by that about an arc that touches the rail, up to which a line is straight. About an
 arc that bends little over its last 8 m both are the stairs of the raster, and within 10 % of each other by chance."""
+
+SHARED_M = 0.05
+"""Lines that are closer share their cells: each is up to half a cell, `STAIRS_M`, off the mean of both rails, and half
+of the distance to an even point of the other is added."""
 
 MIN_AHEAD_M = 4.0
 """Shortest length of a stock rail beyond the end of its branch, where the branch is to be connected."""
@@ -163,6 +168,10 @@ def attach_branches(network: LineNetwork, seen: cKDTree, max_gap_m: float, progr
 
 def _touch(from_end: np.ndarray, line: np.ndarray) -> tuple[int, Bridge] | None:
     """Find the vertex of a line from which another one, given from its end inward, branches off, and the curve."""
+    shared_m = _shared_m(from_end, line)
+    if Polyline(from_end).length_m - shared_m < FIT_M:
+        return None
+    from_end = cut_back(from_end, shared_m)
     tip, outward = tip_and_direction(even_points(from_end, DIRECTION_M))
     axes = np.array([outward, [-outward[1], outward[0]]])
     x, y = axes @ (line - tip).T
@@ -190,7 +199,18 @@ def _touch(from_end: np.ndarray, line: np.ndarray) -> tuple[int, Bridge] | None:
         return None
     further = int(np.searchsorted(Polyline(stock).t, curve.cuts_m[1]))
     vertex = int(onward + further if way[0] < way[-1] else onward - further)
+    curve = replace(curve, cuts_m=(shared_m + curve.cuts_m[0], curve.cuts_m[1]))
     return (vertex, curve) if 0 < vertex < len(line) - 1 else None
+
+
+def _shared_m(from_end: np.ndarray, line: np.ndarray) -> float:
+    """Measure the length, from its end inward, over which a line is drawn on another one: both share their cells."""
+    reach = np.abs(line - from_end[0]).max(axis=1) < MAX_BACK_M
+    if not reach.any():
+        return 0.0
+    points = even_points(from_end, MAX_BACK_M)
+    apart_m = cKDTree(even_points(line[reach])).query(points)[0]
+    return STEP_M * int(np.argmax(np.append(apart_m, np.inf) > SHARED_M))
 
 
 def _is_leg(way: np.ndarray, apart: np.ndarray, arc: PartingLaw) -> bool:
