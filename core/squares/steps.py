@@ -134,19 +134,37 @@ def whole_rails(
 ) -> list[RailLine]:
     """Join the rails of all squares, drop the short ones, cut turns too sharp for a rail, simplify and number them.
 
-    Far rails with fewer than `least_points` on their heads are left out. Results that are let go of once they were
-    yielded save a third of the memory of a long railway.
+    Rails whose place no points show are left out, and far ones with fewer than `least_points` on their heads. Results
+    that are let go of once they were yielded save a third of the memory of a long railway.
     """
     rails = [rail for rail in join(results, frame) if rail.length_m >= parameters.min_length_m]
-    shown = _are_shown(rails, least_points)
-    far_m = [rail.length_m for rail, is_shown in zip(rails, shown) if not is_shown]
-    if far_m:
-        progress.warning(
-            f"{counted(len(far_m), 'line')} ({sum(far_m):,.0f} m) left out: far from the scanner, fewer than "
-            f"{least_points} points do not show a railhead. Classify these rails if you need them."
-        )
-    kept = [rail for rail, is_shown in zip(rails, shown) if is_shown]
-    return _numbered(numbered(kept), parameters, first_id, progress)
+    rails = _chosen(
+        rails,
+        [_is_placed(rail, parameters.head_width_m) for rail in rails],
+        "no points show where across their heads are. Classify more of these rails' points if you need them.",
+        progress,
+    )
+    rails = _chosen(
+        rails,
+        _are_shown(rails, least_points),
+        f"far from the scanner, fewer than {least_points} points do not show a railhead. Classify these rails if you "
+        "need them.",
+        progress,
+    )
+    return _numbered(numbered(rails), parameters, first_id, progress)
+
+
+def _chosen(rails: Sequence[RailLine], kept: Sequence[bool], why: str, progress: Progress) -> list[RailLine]:
+    """Choose rails, and warn why the others are left out."""
+    others_m = [rail.length_m for rail, is_kept in zip(rails, kept) if not is_kept]
+    if others_m:
+        progress.warning(f"{counted(len(others_m), 'line')} ({sum(others_m):,.0f} m) left out: {why}")
+    return [rail for rail, is_kept in zip(rails, kept) if is_kept]
+
+
+def _is_placed(rail: RailLine, head_width_m: float) -> bool:
+    """Return whether a line is known to lie on its head anywhere; one that was not measured may lie anywhere."""
+    return rail.support is None or float(rail.support.sigma_m.min()) <= head_width_m
 
 
 def _are_shown(rails: Sequence[RailLine], least_points: int) -> list[bool]:
