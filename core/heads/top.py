@@ -36,6 +36,16 @@ UNSEEN_TURN = 1e-5
 """Change of the vertical curvature per metre that a rail may have where no point shows it, 1/m²: settled track has
 waves of 10 mm that are 60 m long."""
 
+SUNK_M = 0.02
+"""Depth below the course of the head on both sides from which a section does not show its top: the web begins 40 mm
+below it, and no rail dips by half of this within the longest of `SUNK_LENGTHS_M`."""
+
+SUNK_LENGTHS_M = (4.0, 6.0, 8.0, 12.0, 16.0)
+"""Lengths of the windows in which such sections are looked for; each finds those of half to three quarters of it."""
+
+BESIDE_SUNK_M, MIN_BESIDE = 8.0, 16
+"""Length of the course on either side of a window, and least number of stations there: half of them."""
+
 PROFILE_BIN_M = 0.25
 """Bins along the line in which points are averaged: half the distance between the knots of the spline."""
 
@@ -138,13 +148,40 @@ def by_outline(top: Top, outline: Middles) -> Top:
     outlined = np.isfinite(outline.top) & (outline.top_information > 0)
     by_points = count / robust_sigma(flat - top.course.at(points.t)) ** 2
     information = np.where(outlined, outline.top_information, by_points)
-    known = information > 0
-    if not known.any():
+    values = np.where(outlined, outline.top, mean_m)
+    known = np.flatnonzero(information > 0)
+    known = known[~are_sunk(stations[known], values[known])]
+    if not len(known):
         return top
-    t, values = stations[known], np.where(outlined, outline.top, mean_m)[known]
+    t, values = stations[known], values[known]
     course = smooth(t, values, information[known], -TAIL_M, points.length_m + TAIL_M)
     common_m = np.where(outlined, outline.top_common, top.crown_m)[known]
     return replace(top, course=course, crown_m=np.interp(stations, t, course.followed(t, common_m, information[known])))
+
+
+def are_sunk(t: np.ndarray, z: np.ndarray) -> np.ndarray:
+    """Return which heights at increasing chainages, (n,) metres, are no top, because both sides of them are higher.
+
+    Far from the scanner, hardly any points are on the crown of a head, and those on the web take its place.
+    """
+    sunk = np.zeros(len(t), dtype=bool)
+    first_m, last_m = (t[0] + BESIDE_SUNK_M, t[-1] - BESIDE_SUNK_M) if len(t) else (0.0, 0.0)
+    for length_m in SUNK_LENGTHS_M:
+        for start_m in np.arange(first_m, last_m - length_m, length_m / 4):
+            borders_m = start_m + np.array([-BESIDE_SUNK_M, 0.0, length_m, length_m + BESIDE_SUNK_M])
+            first, begin, end, last = np.searchsorted(t, borders_m)
+            if min(begin - first, last - end) < MIN_BESIDE or begin == end:
+                continue
+            beside = np.r_[first:begin, end:last]
+            course = np.polynomial.Polynomial.fit(t[beside], z[beside], 2)
+            if np.median(z[begin:end] - course(t[begin:end])) < -SUNK_M and _follow(z[beside], course(t[beside])):
+                sunk[begin:end] |= z[begin:end] < course(t[begin:end]) - 0.5 * SUNK_M
+    return sunk
+
+
+def _follow(z: np.ndarray, course: np.ndarray) -> bool:
+    """Return whether heights follow a course."""
+    return bool(np.sqrt(np.mean((z - course) ** 2)) < 0.25 * SUNK_M)
 
 
 def by_lone_ridge(top: Top, smoothing_m: float | None, prior: Prior) -> Top:

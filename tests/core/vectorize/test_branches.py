@@ -105,3 +105,17 @@ def test_a_straight_leg_of_a_crossing_is_no_branch(apart_m, radius, joined):
     loose = LineNetwork(lines, np.concatenate([line[[0, -1]] for line in lines]), np.arange(4).reshape(2, 2))
     network = attach_branches(loose, cKDTree(np.concatenate(lines)), 20.0)
     assert sorted(network.degrees()) == ([1, 1, 1, 3] if joined else [1] * 4)
+
+
+def test_a_branch_whose_end_is_drawn_on_a_rail_leaves_that_rail():
+    """In world 10880 a join had drawn the rail anew, and the branch was led to the rail that it crosses further back."""
+    stock, crossed = along_x(0, 60), along_x(0, 60)
+    crossed[:, 1] = (crossed[:, 0] - 22.0) / 10
+    arc = trace([Element(40, 1 / 190, 1 / 190)], (30.0, 0.0)).xy[::5]
+    on_stock = stock[(stock[:, 0] > 25.0) & (stock[:, 0] < 30.0)] + [0.0, 0.01]
+    lines = (stock, crossed, np.concatenate([on_stock, arc + [0.0, 0.01]]))
+    loose = LineNetwork(lines, np.concatenate([line[[0, -1]] for line in lines]), np.arange(6).reshape(3, 2))
+    network = attach_branches(loose, cKDTree(np.concatenate(lines)), 5.0)
+    ((node, line, _),) = network.passes
+    np.testing.assert_array_equal(network.lines[line], stock)
+    assert network.nodes[node][0] == pytest.approx(30 + np.sqrt(2 * 190 * MISFIT_M), abs=1.5)
