@@ -160,7 +160,7 @@ def by_outline(top: Top, outline: Middles) -> Top:
 
 
 def are_sunk(t: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """Return which heights at increasing chainages, (n,) metres, are no top, because both sides of them are higher.
+    """Return which heights at increasing chainages, (n,) metres, are not those of the top: both sides are higher.
 
     Far from the scanner, hardly any points are on the crown of a head, and those on the web take its place.
     """

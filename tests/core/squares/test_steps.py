@@ -93,7 +93,7 @@ def test_rasters_of_both_parts_of_a_class_are_one():
 
 
 def test_lines_whose_place_no_points_show_are_left_out():
-    """In worlds 10876 and 11062 far lines with a standard error of 0.3 m throughout were up to 12 cm off their heads."""
+    """In worlds 10876 and 11062, far lines with a standard error of 0.3 m were up to 12 cm off their heads."""
     parameters = Parameters(STANDARD.gauge_m, STANDARD.head_width_m)
     lines = [np.array([[0.0, y], [30.0, y]]) for y in (0.0, 5.0, 10.0)]
     rails, errors_m = rails_of(*lines), ([0.3, 0.3], [0.3, 0.002], [0.002, 0.002])

@@ -108,7 +108,7 @@ def test_a_straight_leg_of_a_crossing_is_no_branch(apart_m, radius, joined):
 
 
 def test_a_branch_whose_end_is_drawn_on_a_rail_leaves_that_rail():
-    """In world 10880 a join had drawn the rail anew, and the branch was led to the rail that it crosses further back."""
+    """In world 10880 a join had drawn the rail again, and the branch was led to a rail that it crosses further back."""
     stock, crossed = along_x(0, 60), along_x(0, 60)
     crossed[:, 1] = (crossed[:, 0] - 22.0) / 10
     arc = trace([Element(40, 1 / 190, 1 / 190)], (30.0, 0.0)).xy[::5]
