@@ -141,7 +141,7 @@ def whole_rails(
     rails = _chosen(
         rails,
         [_is_placed(rail, parameters.head_width_m) for rail in rails],
-        "no points show where across their heads are. Classify more of these rails' points if you need them.",
+        "no points show where across their heads are. Classify more points of these rails if you need them.",
         progress,
     )
     rails = _chosen(
