@@ -43,7 +43,7 @@ COARSE_M = 1.0
 BEND_M = 1.5
 """Length of line before and behind a bend that shows its direction: shorter ones show the stairs of the raster."""
 
-BEND_DEG = 2.5
+BEND_DEG = 2.8
 """A line that changes over to a wing rail at a frog of 1:20 bends by 2.9 degrees, and one that changes over to a check
 rail, 0.14 m aside within 2.5 m, by 3; stairs turn directions by a degree. Where a rail only seems to bend, both parts
 are joined again."""
