@@ -148,14 +148,16 @@ def _of_head(points: HeadPoints, unseen_m: float, by_outline: bool) -> Shown:
     on_head, mean_m = _means(top[top.within(0.5)])
     free = points.free & ~hidden_edges(points)
     edge_m, edge_information = edge_middles(points, free)
-    by_edges, either_end_m = np.isfinite(edge_m), _either_end(points)
+    # Windows and sections are longer than a station, and show nothing where no points are on the head.
+    shown, either_end_m = on_head > 0, _either_end(points)
+    by_edges = np.isfinite(edge_m) & shown
     outline = Middles.unknown(len(stations))
     if by_outline:
-        outline = outline_middles(points, (by_edges | (either_end_m == 0)) & free.all(axis=0))
+        outline = outline_middles(points, shown & (by_edges | (either_end_m == 0)) & free.all(axis=0))
     outlined = np.isfinite(outline.offset)
     wanted = ~outlined & free.all(axis=0)
     beside = beside_faces(points, wanted)
-    which = [outlined, wanted & np.isfinite(beside.offset), by_edges, on_head > 0]
+    which = [outlined, wanted & np.isfinite(beside.offset), by_edges, shown]
     unsure_m = np.hypot(unseen_m, either_end_m)
     by_mean = np.full(len(stations), STATION_STEP_M / unseen_m**2)
     return Shown(
