@@ -127,7 +127,7 @@ def _figures_of(answers: Iterable[HasFigures]) -> SearchFigures:
 def search_alike(parts: Sequence[Part], search: Callable[[Sequence[Part], Way], Iterable[Answer]]) -> Iterator[Answer]:
     """Search all parts of a cloud, those that show most first, in the way that suits it."""
     found: list[Answer] = []
-    done = 0  # parts, of which some may have failed: there are no answers for these
+    done = 0  # number of parts that were searched; one that failed has no answer
 
     def seen_until(enough: Callable[[SearchFigures], bool]) -> SearchFigures:
         nonlocal done

@@ -46,6 +46,9 @@ SUNK_LENGTHS_M = (4.0, 6.0, 8.0, 12.0, 16.0)
 BESIDE_SUNK_M, MIN_BESIDE = 8.0, 16
 """Length of the course on either side of a window, and least number of stations there: half of them."""
 
+SUNK_ROUGH_M = 0.005
+"""Largest scatter of the stations there about the course (RMS): beyond it, some of them may be sunk as well."""
+
 PROFILE_BIN_M = 0.25
 """Bins along the line in which points are averaged: half the distance between the knots of the spline."""
 
@@ -172,16 +175,12 @@ def are_sunk(t: np.ndarray, z: np.ndarray) -> np.ndarray:
             first, begin, end, last = np.searchsorted(t, borders_m)
             if min(begin - first, last - end) < MIN_BESIDE or begin == end:
                 continue
-            beside = np.r_[first:begin, end:last]
-            course = np.polynomial.Polynomial.fit(t[beside], z[beside], 2)
-            if np.median(z[begin:end] - course(t[begin:end])) < -SUNK_M and _follow(z[beside], course(t[beside])):
-                sunk[begin:end] |= z[begin:end] < course(t[begin:end]) - 0.5 * SUNK_M
+            inside, beside = slice(begin - first, end - first), np.r_[: begin - first, end - first : last - first]
+            here, powers = z[first:last], np.vander(t[first:last] - start_m, 3)
+            off_m = here - powers @ np.linalg.lstsq(powers[beside], here[beside], rcond=None)[0]
+            if np.median(off_m[inside]) < -SUNK_M and np.std(off_m[beside]) < SUNK_ROUGH_M:
+                sunk[begin:end] |= off_m[inside] < -SUNK_M / 2
     return sunk
-
-
-def _follow(z: np.ndarray, course: np.ndarray) -> bool:
-    """Return whether heights follow a course."""
-    return bool(np.sqrt(np.mean((z - course) ** 2)) < 0.25 * SUNK_M)
 
 
 def by_lone_ridge(top: Top, smoothing_m: float | None, prior: Prior) -> Top:
