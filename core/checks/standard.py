@@ -252,8 +252,7 @@ def head_widths(
     if points.strips is not None:  # strips side by side would look like a wider head
         strips, counts = np.unique(points.strips, return_counts=True)
         points = points.kept(points.strips == strips[np.argmax(counts)])
-    xyz = points.xyz
-    measured = measure_spacings(middle(xyz)).most_common()
+    measured = measure_spacings(middle(points.xyz)).most_common()
     lines = [rail.xyz[:, :2] - points.frame.shift_to(source.frame)[:2] for rail in rails]
     stated_m = gauges[0][1] if measured is None else width_at(measured[0], gauges)
     if judged(points, lines, stated_m).blunt:
@@ -267,7 +266,7 @@ def head_widths(
         return HeadWidths(float("nan"), stated_m)
     seen_m = measured[1]
     if rails and HEAD_OFF_M < seen_m - stated_m < MIN_WIDER_M:
-        seen_m = likelier_width(lines, xyz, (stated_m, seen_m))
+        seen_m = likelier_width(lines, points, (stated_m, seen_m))
     widths = HeadWidths(seen_m, stated_m)
     if widths.differ:
         _warn_of_widths(widths, measured[0], gauges, progress)

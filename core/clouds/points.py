@@ -16,7 +16,7 @@ from ..run.tasks import READ_S, Runner, Task
 from ..standards import LAST_CLASS
 from .crs import common_crs, is_geographic, name_of, parse_crs, units, utm_zone, warn_of_scale
 from .mask import Mask
-from .passes import number_passes
+from .passes import are_of_scanner, number_passes
 from .readers import Chunk, CloudHeader, Extent, Paths, either, list_files, read_classes, read_header
 
 Result = TypeVar("Result")
@@ -44,7 +44,8 @@ class RailPoints:
 
     `strips`, (n,), has the number of the strip, a pass of the scanner, that each point belongs to; None if all points
     are of one strip. If `found`, they are from a raw cloud, and not by their class: in a blunt one they are whole
-    ridges. `blunt` says whether the cloud blunts heads, as its lines have shown; None before there are any.
+    ridges. `blunt` says whether the cloud blunts heads, as its lines have shown; None before there are any. `scanned`
+    says whether times show that a scanner measured all points; those of images have none.
 
     Where the file states no strips and the heads have shown them, `apart`, (s, 4), has how far the strips 1 to s are
     off the mean of all passes, x, y and z, and the number of passes in each.
@@ -57,6 +58,7 @@ class RailPoints:
     found: bool = False
     blunt: bool | None = None
     apart: np.ndarray | None = None
+    scanned: bool = False
 
     def kept(self, which: np.ndarray) -> RailPoints:
         """Return some of the points, by a mask (n,) bool or by their numbers (k,)."""
@@ -131,8 +133,10 @@ def read_requested(request: Request, progress: Progress = SILENT) -> tuple[RailP
     frame = request.frame_at([np.unique(column, return_counts=True) for column in origin_steps(xyz).T])
     local = frame.to_local(xyz)
     strips = strips_of(local, marks)
+    classes = (codes == code for code in np.unique(codes))
     return tuple(
-        RailPoints(local[codes == code], frame, int(code), several(strips[codes == code])) for code in np.unique(codes)
+        RailPoints(local[own], frame, int(codes[own][0]), several(strips[own]), scanned=are_of_scanner(marks[own]))
+        for own in classes
     )
 
 

@@ -219,8 +219,7 @@ def measure_again(
     """
     plans = [rail.line.resampled(KNOT_M).xy for rail in rails]
     points = told_apart(points, plans, head_width_m)
-    seen = points.strips, progress.span(0.0, 0.7), points.blunt, points.apart
-    near = near_lines(plans, points.xyz, head_width_m, *seen)
+    near = near_lines(plans, points, head_width_m, progress.span(0.0, 0.7))
     measured = []
     for rail, head in zip(rails, progress.span(0.7, 1.0).follow(near)):
         # Lines from a file are only known to be on their heads, so the head width takes the place of the cell size.

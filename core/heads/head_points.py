@@ -116,7 +116,7 @@ class HeadPoints:
     line : (k, 2) array
     free : (2, s) bool array
         Where the right and the left edge of the head are free of other heads; see `free_edges`.
-    strips, apart : arrays or None
+    strips, apart, scanned : arrays or None, bool
         See `RailPoints`.
     is_blunt : bool
         Whether the cloud blunts heads: all or none, for one line alone, a centimetre off its head, may look otherwise.
@@ -131,6 +131,7 @@ class HeadPoints:
     strips: np.ndarray | None = None
     is_blunt: bool = False
     apart: np.ndarray | None = None
+    scanned: bool = False
 
     def __getitem__(self, which: np.ndarray) -> HeadPoints:
         strips = None if self.strips is None else self.strips[which]
@@ -223,28 +224,21 @@ class HeadPoints:
 
 
 def near_lines(
-    lines: Sequence[np.ndarray],
-    xyz: np.ndarray,
-    widths: Widths,
-    strips: np.ndarray | None = None,
-    progress: Progress = SILENT,
-    blunt: bool | None = None,
-    apart: np.ndarray | None = None,
+    lines: Sequence[np.ndarray], points: RailPoints, widths: Widths, progress: Progress = SILENT
 ) -> list[HeadPoints]:
     """Find the points of each line, (k, 2); `widths`, metres, are those of all heads or of each.
 
     If it is not known whether the cloud blunts heads, these lines show it.
     """
-    feet = project(lines, xyz[:, :2], HALF_RANGE_BINS / (2 * HALF_HEAD_BINS) * widest(widths), progress)
-    z, own = xyz[feet.point, 2], None if strips is None else strips[feet.point]
+    feet = project(lines, points.xyz[:, :2], HALF_RANGE_BINS / (2 * HALF_HEAD_BINS) * widest(widths), progress)
+    z, own = points.xyz[feet.point, 2], None if points.strips is None else points.strips[feet.point]
     heads = []
     for number, width_m in enumerate(np.broadcast_to(widths, len(lines)).tolist()):
         mine = slice(*np.searchsorted(feet.line, [number, number + 1]))
         strip = None if own is None else own[mine]
-        heads.append(
-            HeadPoints(feet.t[mine], feet.across[mine], z[mine], width_m, lines[number], NO_EDGES, strip, apart=apart)
-        )
-    is_blunt = _are_blunt(heads) if blunt is None else blunt
+        places = feet.t[mine], feet.across[mine], z[mine], width_m, lines[number]
+        heads.append(HeadPoints(*places, NO_EDGES, strip, apart=points.apart, scanned=points.scanned))
+    is_blunt = _are_blunt(heads) if points.blunt is None else points.blunt
     free = free_edges(lines, widest(widths), BESIDE_BLUNT_HEADS if is_blunt else BESIDE_HEADS)
     return [replace(head, is_blunt=is_blunt, free=own) for head, own in zip(heads, free)]
 
@@ -253,7 +247,7 @@ def judged(points: RailPoints, lines: Sequence[np.ndarray], widths: Widths) -> R
     """Return points that know whether their cloud blunts heads, by lines, (k, 2) each, if it is not known yet."""
     if points.blunt is not None or not lines:
         return points
-    return replace(points, blunt=near_lines(lines, points.xyz, widths, points.strips)[0].is_blunt)
+    return replace(points, blunt=near_lines(lines, points, widths)[0].is_blunt)
 
 
 def _about_crest(points: HeadPoints) -> HeadPoints:

@@ -95,9 +95,7 @@ def _shifted(
     align: bool = False,
 ) -> LineNetwork:
     """Move every line to the middle of its head, and the nodes with them."""
-    near = near_lines(
-        network.lines, points.xyz, widths, points.strips, progress.span(0.0, 0.7), points.blunt, points.apart
-    )
+    near = near_lines(network.lines, points, widths, progress.span(0.0, 0.7))
     lines = []
     for line, head in zip(network.lines, progress.span(0.7, 1.0).follow(near)):
         strips = measure_strips(head) if by_outline else None

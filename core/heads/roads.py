@@ -7,7 +7,7 @@ the flanges. See docs/method.md section 6.9.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.ndimage import binary_opening
@@ -85,7 +85,7 @@ def onto_heads(
     Other lines, (n, 2), stay as they are. `heads_m` are the widths of their heads, and `spacings_m` the distances
     between the axes of the two rails of a track.
     """
-    near = near_lines(lines, points.xyz, heads_m, blunt=points.blunt)
+    near = near_lines(lines, replace(points, strips=None), heads_m)
     either = [_on_either_end(on_own_level(head)) for head in near]
     candidates = [(line,) if band is None else band.lines for line, band in zip(lines, either)]
     return tuple(

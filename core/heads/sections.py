@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
+from ..clouds.points import RailPoints
 from ..spread import sigma_by_median
 from .edges import VIEW_STATIONS
 from .head_points import ENOUGH_POINTS, HeadPoints, near_lines
@@ -330,15 +331,15 @@ def _blur(section: Section, wider_m: float, offset: np.ndarray, apart_up_m: floa
     return float(blur_m) if is_blurred else 0.0
 
 
-def likelier_width(lines: Sequence[np.ndarray], xyz: np.ndarray, widths_m: Sequence[float]) -> float:
-    """Return which of several widths of heads explains points, (n, 3), on rails best, metres; the first if none does.
+def likelier_width(lines: Sequence[np.ndarray], points: RailPoints, widths_m: Sequence[float]) -> float:
+    """Return which of several widths of heads explains points on rails best, metres; the first if none does.
 
     Other than the spread of the points, this does not depend on their noise and on how much of the faces is classified.
     """
     grid, outlines = Grid.of(max(widths_m)), [Outline.of(width_m) for width_m in widths_m]
     likelihood = np.zeros(len(widths_m))
-    for points in near_lines(lines, xyz, max(widths_m)):
-        for counts in _counted(replace(points, width_m=widths_m[0]), grid):
+    for head in near_lines(lines, points, max(widths_m)):
+        for counts in _counted(replace(head, width_m=widths_m[0]), grid):
             likelihood += [log_likelihood(counts, fit_section(counts, one, grid), one, grid) for one in outlines]
     return widths_m[int(np.argmax(likelihood))]
 

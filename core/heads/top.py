@@ -55,11 +55,14 @@ PROFILE_BIN_M = 0.25
 TAIL_M = 1.0
 """Length over which a profile is extrapolated with the slope at its end; beyond it is level."""
 
+LOWERED_SHARE, LOWERED_ERROR_SHARE = 0.25, 0.3
+"""By how much a beam lowers the crest of a blunt head, and its standard error, as shares of the fall of the head at the
+edge of the part that gives the height. A beam of half the head's width does not lower it, one as wide by 0.3 to 0.8 of
+the fall, which is 7 to 15 mm for both, because heads fall as much below a narrower beam above a deeper bed."""
+
 BLENDED_ERROR_M, BLENDED_SHARE = 0.002, 0.5
-"""Least standard error of the height of a blunt head, metres, and its share of the fall of the head at the edge of the
-part that gives the height. A beam lowers the crest by a share of this fall: by nothing if it is half as wide as the
-head, by 0.3 to 0.8 if it is as wide. The fall is 7 to 15 mm for both, because heads fall as much below a narrower beam
-above a deeper bed."""
+"""Least standard error of the height of a blunt head, metres, and its share of this fall where images may blur it: what
+they show is not raised, because their blur may be of any size."""
 
 LEAST_INFORMATION = 1e-6
 """Information about level, slope and fall of a crown that is always there, so that few points are enough."""
@@ -70,18 +73,19 @@ class Crown:
     """How the top of a head falls beside its axis: in proportion to the square of the distance, up to the rims.
 
     `bend` and `sigma` are the fall per square of the distance and its standard error, 1/m, and `rim_m` is the distance
-    from the axis up to which the top falls. `level_m` is the standard error of the level of the top that more points
-    would not reduce.
+    from the axis up to which the top falls. All of it seems `lowered_m` lower than it is, and `level_m` is the standard
+    error of its level that more points would not reduce.
     """
 
     bend: float
     sigma: float
     rim_m: float
     level_m: float = 0.0
+    lowered_m: float = 0.0
 
     def fall(self, across: np.ndarray) -> np.ndarray:
-        """Return how far points are lower than the axis of their head because they are beside it, (n,) metres."""
-        return self.bend * np.minimum(np.abs(across), self.rim_m) ** 2
+        """Return how far points beside the axis of their head are lower than the head is on it, (n,) metres."""
+        return self.lowered_m + self.bend * np.minimum(np.abs(across), self.rim_m) ** 2
 
     def error(self, head_width_m: float) -> float:
         """Return the standard error of the height on the axis, metres, from points up to `AXIS_SHARE` beside it."""
@@ -220,9 +224,16 @@ def fit_crown(points: HeadPoints) -> Crown:
         off = above - powers @ found
         used = np.abs(off) <= OFF_TOP_SIGMAS * robust_sigma(off)
     bend = max(-found[2], 0.0)
-    fall_m = bend * (AXIS_SHARE * points.width_m) ** 2
-    blended_m = max(BLENDED_SHARE * fall_m, BLENDED_ERROR_M) if points.is_blunt else 0.0
-    return Crown(bend, float(np.sqrt(covariance[2, 2])), rim_m, blended_m)
+    crown = Crown(bend, float(np.sqrt(covariance[2, 2])), rim_m)
+    return _raised(crown, points) if points.is_blunt else crown
+
+
+def _raised(crown: Crown, points: HeadPoints) -> Crown:
+    """Return the crown of a blunt head with what a beam lowers it, and with the error of that."""
+    fall_m = crown.bend * (AXIS_SHARE * points.width_m) ** 2
+    share = LOWERED_ERROR_SHARE if points.scanned else BLENDED_SHARE
+    lowered_m = LOWERED_SHARE * fall_m if points.scanned else 0.0
+    return replace(crown, level_m=max(share * fall_m, BLENDED_ERROR_M), lowered_m=lowered_m)
 
 
 def smoothed(t: np.ndarray, z: np.ndarray, smoothing_m: float | None, prior: Prior = SHARP) -> Course:

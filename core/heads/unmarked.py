@@ -121,7 +121,7 @@ def told_apart(points: RailPoints, lines: Sequence[np.ndarray], widths: Widths) 
     """
     if points.strips is not None or not lines:
         return points
-    near = near_lines(lines, points.xyz, widths, np.arange(len(points.xyz)), blunt=False)
+    near = near_lines(lines, replace(points, strips=np.arange(len(points.xyz)), blunt=False), widths)
     near = [head for head in near if head.within(AXIS_SHARE).sum() >= MIN_ON_HEAD]
     crowns = [head[head.within(AXIS_SHARE)] for head in near]
     every = max(sum(len(crown.t) for crown in crowns) // ENOUGH_ON_CROWNS, 1)

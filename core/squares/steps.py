@@ -119,8 +119,8 @@ def _kinds(
     """Return how long heads look sharp and blunt in each strip of a square; see `SquareRails`."""
     lines, rows = [rail.xyz[:, :2] for rail in rails], []
     for strip in strips.tolist() if lines else []:
-        near = near_lines(lines, source.of_strips([strip]).near(square, 0.0).xyz, parameters.head_width_m, blunt=False)
-        rows.append([strip, *lengths_by_kind(near)])
+        own = replace(source.of_strips([strip]).near(square, 0.0), blunt=False)
+        rows.append([strip, *lengths_by_kind(near_lines(lines, own, parameters.head_width_m))])
     return np.array(rows).reshape(-1, 3)
 
 
@@ -249,9 +249,7 @@ def measure_lines(
     told = told_apart(points, network.lines, heads)
     if told is not points:
         points, network = told, refine(network, told, heads, *settings)
-    near = near_lines(
-        network.lines, points.xyz, heads, points.strips, elevating.span(0.0, 0.6), points.blunt, points.apart
-    )
+    near = near_lines(network.lines, points, heads, elevating.span(0.0, 0.6))
     strips = [measure_strips(head) for head in near]
     rails = elevate(network, near, class_code, elevation, elevating.span(0.6, 1.0), strips)
     return rails, rows_of(network.lines, strips), points.blunt

@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from ..clouds.on_heads import heads_of
-from ..clouds.passes import number_passes
+from ..clouds.passes import are_of_scanner, number_passes
 from ..clouds.points import RailPoints, Request, origin_steps
 from ..clouds.readers import CloudHeader
 from ..disk import discard, scratch_folder, writing
@@ -143,9 +143,12 @@ class SpooledPoints:
         files = [file for key in keys for file in self.files.get(key, ())]
         parts = [_read(file, square, margin_m) for file in files]
         xyz = parts[0] if len(parts) == 1 else np.concatenate(parts or [np.empty((0, 3))])
-        strips = np.array([self.passes[key_of(file)[-1]] for file in files], dtype=np.int32)
+        marks = [key_of(file)[-1] for file in files]
+        strips = np.array([self.passes[mark] for mark in marks], dtype=np.int32)
         each = np.repeat(strips, [len(part) for part in parts]) if len(np.unique(strips)) > 1 else None
-        return heads_of(RailPoints(xyz, square.frame, self.class_code, each, self.found, self.blunt))
+        scanned = are_of_scanner(np.array(marks, dtype=np.int64))
+        points = RailPoints(xyz, square.frame, self.class_code, each, self.found, self.blunt, scanned=scanned)
+        return heads_of(points)
 
     def judged(self, blunt: bool) -> SpooledPoints:
         """See `PointSource`."""

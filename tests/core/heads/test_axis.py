@@ -53,7 +53,7 @@ def test_errors_of_lines_are_as_large_as_stated(left_m, noise_m):
     points = cloud_of(*rails)
     network = smooth_network(vectorize(rasterize(points.xyz, cell_size(GAUGE, WIDTH)), WIDTH), 0.8)
     network = refine(network, points, WIDTH)
-    lines = elevate(network, near_lines(network.lines, points.xyz, WIDTH), 10)
+    lines = elevate(network, near_lines(network.lines, points, WIDTH), 10)
     errors, local, whole = [], [], []
     for line, worn_m in zip(lines, (0.0006, -0.0006)):
         stations = interpolate(line.xyz[:, :2], length_along(line.xyz[:, :2]), line.support.t)

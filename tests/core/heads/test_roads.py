@@ -52,7 +52,7 @@ def test_a_band_without_a_partner_stays_and_its_error_is_half_of_the_road():
     points = points.kept(points.xyz[:, 1] > 0)
     lines = onto_heads(drawn(0.5 * (SPACING + 0.07)), points, np.array([WIDTH]), [SPACING])
     assert np.allclose(lines[0][:, 1], 0.5 * (SPACING + 0.07))
-    (rail,) = elevate(network_of(*lines), near_lines(lines, points.xyz, WIDTH), 10)
+    (rail,) = elevate(network_of(*lines), near_lines(lines, points, WIDTH), 10)
     assert np.median(rail.support.sigma_m) == pytest.approx(0.035, abs=0.004)
 
 
@@ -61,6 +61,6 @@ def test_a_few_points_beside_a_head_are_no_road():
     random = np.random.RandomState(1)
     across = np.concatenate([random.uniform(-0.5 * WIDTH, 0.5 * WIDTH, 20000), random.uniform(0.03, 0.07, 1500)])
     cloud = np.column_stack([random.uniform(0, LENGTH, len(across)), across, random.normal(0, 0.003, len(across))])
-    (points,) = near_lines(drawn(0.0), cloud, WIDTH)
+    (points,) = near_lines(drawn(0.0), cloud_of(cloud), WIDTH)
     right_m, left_m = bands(points)
     assert np.median(left_m - right_m) == pytest.approx(WIDTH, abs=0.006)

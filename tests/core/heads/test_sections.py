@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from built import cloud_of
 from rail_extract.core.heads.head_points import HeadPoints, stations_along
 from rail_extract.core.heads.sections import likelier_width, outline_middles
 from rail_extract.laboratory.scenes.scanner import NEW, Profile, Scanner, scan
@@ -101,7 +102,7 @@ def test_the_outline_shows_which_width_heads_have_whatever_the_noise(width_m):
     heads = [scanned(80, noise_m=0.006, seed=seed, width_m=width_m) for seed in (1, 2)]
     heads[1][1] += 1.5
     line = np.column_stack([np.arange(0, LENGTH, 0.5), np.zeros(int(2 * LENGTH))])
-    lines, xyz = [line, line + [0, 1.5]], np.concatenate(heads, axis=1).T
-    assert likelier_width(lines, xyz, (0.066, 0.072)) == min(width_m, 0.072)
-    assert likelier_width(lines, xyz, (0.072, 0.078)) == max(width_m, 0.072)
-    assert likelier_width(lines, xyz[:100], (0.072, 0.078)) == 0.072
+    lines, points = [line, line + [0, 1.5]], cloud_of(*(head.T for head in heads))
+    assert likelier_width(lines, points, (0.066, 0.072)) == min(width_m, 0.072)
+    assert likelier_width(lines, points, (0.072, 0.078)) == max(width_m, 0.072)
+    assert likelier_width(lines, cloud_of(points.xyz[:100]), (0.072, 0.078)) == 0.072

@@ -52,7 +52,7 @@ def scanned(passes):
 
 
 def strips_along(lines, points):
-    return [measure_strips(one) for one in near_lines(lines, points.xyz, HEAD_M, points.strips)]
+    return [measure_strips(one) for one in near_lines(lines, points, HEAD_M)]
 
 
 @pytest.mark.parametrize("third", [False, True])
@@ -76,7 +76,7 @@ def test_strips_over_the_same_place_are_offset_from_their_mean(third):
 def test_a_line_is_on_the_mean_of_overlapping_strips_however_dense_they_are(across_m, up_m):
     points, line = scanned([(across_m, up_m, 1.0, 3.0, 9000), (-across_m, -up_m, 0.5, 3.0, 3000)])
     network = refine(network_of(line), points, HEAD_M)
-    near = near_lines(network.lines, points.xyz, HEAD_M, points.strips)
+    near = near_lines(network.lines, points, HEAD_M)
     (one,) = elevate(network, near, 10, strips=[measure_strips(near[0])])
     inner = one.xyz[(one.xyz[:, 0] > 3) & (one.xyz[:, 0] < LENGTH_M - 3)]
     assert np.abs(inner[:, 1:].mean(axis=0)).max() < 0.001
@@ -99,7 +99,7 @@ def test_strips_far_apart_are_gathered_wherever_the_line_is(off_m):
 
 def test_points_stay_where_strips_differ_because_each_sees_another_face():
     points, line = scanned([(0.0, 0.0, 9.0, 1.2, 9000), (0.0, 0.0, -9.0, 1.2, 9000)])
-    (near,) = near_lines([line], points.xyz, HEAD_M, points.strips, blunt=False)
+    (near,) = near_lines([line], replace(points, blunt=False), HEAD_M)
     found = measure_strips(near)
     assert np.abs(found.across).min() > 0.003
     np.testing.assert_array_equal(found.moved(near).across, near.across)
@@ -127,7 +127,7 @@ def test_aligned_lines_do_not_step_and_state_what_remains():
     step = {}
     for align in (False, True):
         network = refine(network_of(line), points, HEAD_M, align=align)
-        near = near_lines(network.lines, points.xyz, HEAD_M, points.strips)
+        near = near_lines(network.lines, points, HEAD_M)
         strips = [measure_strips(one) for one in near]
         (one,) = elevate(network, near, 10, ElevationParameters(align=align), strips=strips)
         true = np.interp(one.xyz[:, 0], line[:, 0], line[:, 1])

@@ -59,7 +59,7 @@ def test_lines_are_on_the_mean_of_passes_and_state_that_they_differ(passes):
     network = refine(network_of(*lines), points, HEAD_M)
     told = told_apart(points, network.lines, HEAD_M)
     network = refine(network, told, HEAD_M)
-    near = near_lines(network.lines, told.xyz, HEAD_M, told.strips, blunt=told.blunt, apart=told.apart)
+    near = near_lines(network.lines, told, HEAD_M)
     rails = elevate(network, near, 10, strips=[measure_strips(one) for one in near])
     rails = sorted(rails, key=lambda rail: rail.xyz[0, 1])
     again = measure_again(rails, points, HEAD_M)
