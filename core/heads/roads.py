@@ -32,8 +32,9 @@ MIN_LENGTH_M, SMOOTHING_M = 8.0, 3.0
 """Length along which the points have to form such a band: heads that cross at 1:26.5 cover each other over 6 m; and
 sigma of PAEK for the ends of the band."""
 
-MAX_MISS_M, CLEARLY_M = 0.015, 0.012
-"""Largest deviation of two heads from their distance, and by how much the other end of the band must be further off."""
+MAX_MISS_M, CLEARLY_M = 0.015, 0.01
+"""Largest deviation of two heads from their distance, and by how much the other end of the band and its middle must be
+further off."""
 
 AT_EDGE_M = 0.012
 """Largest distance of the end of a band from the edge of the head: lines are within 1 cm of the axis."""
@@ -86,23 +87,26 @@ def onto_heads(
     between the axes of the two rails of a track.
     """
     near = near_lines(lines, replace(points, strips=None), heads_m)
-    either = [_on_either_end(on_own_level(head)) for head in near]
-    candidates = [(line,) if band is None else band.lines for line, band in zip(lines, either)]
+    found = [_within(on_own_level(head)) for head in near]
+    candidates = [(line,) if band is None else band.lines for line, band in zip(lines, found)]
     return tuple(
         _at_gauge(line, band, candidates[:number] + candidates[number + 1 :], spacings_m)
-        for number, (line, band) in enumerate(zip(lines, either))
+        for number, (line, band) in enumerate(zip(lines, found))
     )
 
 
 @dataclass(frozen=True)
 class _Band:
-    """A band of points that is wider than a head: the line moved onto either end, and places there by end, (k, 2)."""
+    """A band of points that is wider than a head: the line in its middle and on either end, and places on each, (k, 2).
 
-    lines: tuple[np.ndarray, np.ndarray]
-    places: tuple[np.ndarray, np.ndarray]
+    The head is in the middle where there is road on both sides of it.
+    """
+
+    lines: tuple[np.ndarray, np.ndarray, np.ndarray]
+    places: tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
-def _on_either_end(points: HeadPoints) -> _Band | None:
+def _within(points: HeadPoints) -> _Band | None:
     """Move a line onto either end of its band; None where the points form none that is wider than a head."""
     right_m, left_m, wide = _wide_bands(points)
     if not wide.any():
@@ -113,18 +117,22 @@ def _on_either_end(points: HeadPoints) -> _Band | None:
         line + smooth_profile(stations, shift, SMOOTHING_M, along)[:, None] * Polyline(line).normals for shift in shifts
     )
     at = stations[wide & (stations <= along[-1])][:: int(PLACE_M / STATION_STEP_M)]
-    return _Band((left, right), (Polyline(left, along).at(at), Polyline(right, along).at(at)))
+    middle_places, left_places, right_places = (Polyline(one, along).at(at) for one in (line, left, right))
+    return _Band((line, left, right), (middle_places, left_places, right_places))
 
 
 def _at_gauge(
     line: np.ndarray, band: _Band | None, others: Sequence[Sequence[np.ndarray]], spacings_m: Sequence[float]
 ) -> np.ndarray:
-    """Return a line on the end of its band that is at gauge from another line; as it is if neither end clearly is."""
+    """Return a line on the end of its band that is at gauge from another line; as it is if neither end clearly is.
+
+    Where both rails have road on both sides, their middles are at gauge as well as their ends.
+    """
     if band is None:
         return line
     misses_m = [_miss(places, [line for lines in others for line in lines], spacings_m) for places in band.places]
-    best = int(np.argmin(misses_m))
-    if misses_m[best] > MAX_MISS_M or misses_m[1 - best] - misses_m[best] < CLEARLY_M:
+    best, second = np.argsort(misses_m)[:2].tolist()
+    if misses_m[best] > MAX_MISS_M or misses_m[second] - misses_m[best] < CLEARLY_M:
         return line
     return band.lines[best]
 
