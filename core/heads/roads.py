@@ -39,8 +39,9 @@ further off."""
 AT_EDGE_M = 0.012
 """Largest distance of the end of a band from the edge of the head: lines are within 1 cm of the axis."""
 
-PLACE_M = 1.0
-"""Spacing of the places at which the distance of two rails is measured."""
+PLACE_M, BESIDE_M = 1.0, 0.2
+"""Spacing of the places at which the distance of two rails is measured, and how much further than a track's other rail
+it is: bands are as much wider than a head, and nearer places alone would look as if they were at gauge."""
 
 
 def bands(points: HeadPoints, window: int = -1) -> tuple[np.ndarray, np.ndarray]:
@@ -141,7 +142,7 @@ def _miss(places: np.ndarray, others: Sequence[np.ndarray], spacings_m: Sequence
     """Return by how much places on a rail, (k, 2), miss the distance of two rails, from the line that does least."""
     found = [np.inf]
     for other in others:
-        away_m = np.abs(Polyline(other).feet(places, max(spacings_m) + MAX_MISS_M).across)
+        away_m = np.abs(Polyline(other).feet(places, max(spacings_m) + BESIDE_M).across)
         if len(away_m):
             found.append(min(abs(float(np.median(away_m)) - spacing_m) for spacing_m in spacings_m))
     return min(found)
