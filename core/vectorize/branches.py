@@ -48,12 +48,14 @@ MAX_BESIDE_M = 1.0
 """A branch that ends further from a rail is not connected to it: nothing of the switch has been seen."""
 
 PARTED_M = 0.3
-"""Two blurred heads are one ridge up to 0.2 m apart, and what is cut off where they part may lead 0.09 m further. A
-line that ends further from a rail was not seen to leave it: if it is straight, it is a leg of a crossing."""
+"""Two blurred heads are one ridge up to 0.2 m apart, and check and wing rails, 0.14 m from the axis, bend the end of a
+line that crosses a rail. What is further from the rail shows whether the line leaves it on an arc."""
 
-STRAIGHTER = 0.9
+STRAIGHTER, MUCH_STRAIGHTER = 0.9, 0.65
 """Scatter about a straight line, by that about an arc that touches the rail, up to which a line is straight. About an
-arc that bends little over its last 8 m both are the stairs of the raster, and within 10 % of each other by chance."""
+arc that bends little over its last 8 m both are the stairs of the raster, and within 10 % of each other by chance. A
+line that comes close to the rail seems to leave it, and is its branch unless it is much straighter: branches whose
+curve ends soon after they have parted have 0.75 and more, legs of crossings 0.3 to 0.6."""
 
 SHARED_M = 0.05
 """Lines that are closer share their cells: each is up to half a cell, `STAIRS_M`, off the mean of both rails, and half
@@ -128,8 +130,7 @@ def _merged_m(one: np.ndarray, other: np.ndarray) -> float:
 
 def _cross(one: np.ndarray, other: np.ndarray) -> bool:
     """Return whether two legs are those of a crossing: they are straight, at an angle to each other."""
-    way, apart = _apart(one, other)
-    return _is_straight(way, apart, PartingLaw.fitted(way, apart, ARC))
+    return _is_straight(*_apart(one, other))
 
 
 def _apart(one: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -172,6 +173,8 @@ def _touch(from_end: np.ndarray, line: np.ndarray) -> tuple[int, Bridge] | None:
     if Polyline(from_end).length_m - shared_m < FIT_M:
         return None
     from_end = cut_back(from_end, shared_m)
+    if _is_leg(from_end, line):
+        return None
     tip, outward = tip_and_direction(even_points(from_end, DIRECTION_M))
     axes = np.array([outward, [-outward[1], outward[0]]])
     x, y = axes @ (line - tip).T
@@ -187,8 +190,6 @@ def _touch(from_end: np.ndarray, line: np.ndarray) -> tuple[int, Bridge] | None:
     if len(own_x) < MIN_POINTS or len(set(np.sign(apart_m))) > 1:
         return None
     arc = PartingLaw.fitted(-own_x, np.abs(apart_m), ARC)
-    if _is_leg(-own_x, np.abs(apart_m), arc):
-        return None
     touch_m = -arc.way_at(MISFIT_M)
     if not 0 < touch_m < min(MAX_BACK_M, x[-1]):
         return None
@@ -213,19 +214,24 @@ def _shared_m(from_end: np.ndarray, line: np.ndarray) -> float:
     return STEP_M * int(np.argmax(np.append(apart_m, np.inf) > SHARED_M))
 
 
-def _is_leg(way: np.ndarray, apart: np.ndarray, arc: PartingLaw) -> bool:
-    """Return whether a line that ends beside a rail is a straight leg of a crossing, not the branch that `arc` is.
+def _is_leg(from_end: np.ndarray, line: np.ndarray) -> bool:
+    """Return whether a line, given from its end inward, is a straight leg of a crossing of another, not its branch."""
+    points = even_points(from_end, 2 * STEADY_M)
+    apart_m = cKDTree(even_points(line)).query(points)[0]
+    first = int(np.argmax(np.append(apart_m, np.inf) > PARTED_M))
+    apart_m = apart_m[first:][: int(STEADY_M / STEP_M)]
+    share = MUCH_STRAIGHTER if first else STRAIGHTER
+    return len(apart_m) * STEP_M >= FIT_M and _is_straight(STEP_M * np.arange(len(apart_m)), apart_m, share)
 
-    `way` and `apart`, (n,), are the way along the rail from the line's end and the distance between both there.
+
+def _is_straight(way: np.ndarray, apart: np.ndarray, share: float = STRAIGHTER) -> bool:
+    """Return whether two lines part at an angle, and a straight line explains their distance better than an arc.
+
+    `way` and `apart`, (n,), are the way along one of them and the distance between both there.
     """
-    return bool(apart[0] > PARTED_M) and _is_straight(way, apart, arc)
-
-
-def _is_straight(way: np.ndarray, apart: np.ndarray, arc: PartingLaw) -> bool:
-    """Return whether two lines part at an angle, and a straight line explains their distance better than an arc."""
-    straight = PartingLaw.fitted(way, apart, STRAIGHT)
-    of_arc, of_straight = (np.std(law(way) - apart) for law in (arc, straight))
-    return bool(straight.slope > np.tan(np.radians(MIN_ANGLE_DEG)) and of_straight < STRAIGHTER * of_arc)
+    straight, arc = (PartingLaw.fitted(way, apart, law) for law in (STRAIGHT, ARC))
+    of_straight, of_arc = (np.std(law(way) - apart) for law in (straight, arc))
+    return bool(straight.slope > np.tan(np.radians(MIN_ANGLE_DEG)) and of_straight < share * of_arc)
 
 
 def choose_routes(network: LineNetwork) -> LineNetwork:

@@ -148,8 +148,7 @@ class _Joins:
     def _cheapest(self, one: int, other: int) -> tuple[float, Bridge] | None:
         """Find the cut of two ends at which joining them costs least; None if no rail could run so, or ends may be."""
         found: tuple[float, Bridge] | None = None
-        # A link is used with both ends, and both are cut.
-        shortest_m = min((0.5 if self.is_link[end // 2] else 1.0) * self.lengths[end // 2] for end in (one, other))
+        shortest_m = min(self.lengths[one // 2], self.lengths[other // 2])
         for cut_m in CUTS_M:
             if shortest_m < cut_m + SKIP_M and cut_m > 0:
                 break
