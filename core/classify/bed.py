@@ -35,10 +35,6 @@ FINE_M = 0.005
 QUANTILE = 0.2
 """Quantile of the heights that is taken as the bed: below the scatter of ballast and grass, above low noise."""
 
-LOW_QUANTILE, HIDDEN_M, SCATTER_M = 0.03, 0.09, 0.02
-"""Lower quantile, and how far below the other one it is where rails hide the bed: half of a rail's height, three times
-as far as the scatter of ballast takes it. The bed is the scatter above it there."""
-
 BELOW_M, ABOVE_M = 0.05, 0.75
 """Heights around the beginning of a level among which the quantile is found."""
 
@@ -235,11 +231,7 @@ def _quantile(cell: np.ndarray, height: np.ndarray, cells: int, low: float) -> n
     row = np.cumsum(held, dtype=np.int32) - np.int32(1)  # the upper levels have few cells
     counts = np.bincount(row[cell] * np.int32(count) + bins, minlength=int(held.sum()) * count).reshape(-1, count)
     below = np.cumsum(counts, axis=1, dtype=np.int32)
-    number, lowest = (
-        np.argmax(below >= np.maximum(share * below[:, -1], 1)[:, None], axis=1) for share in (QUANTILE, LOW_QUANTILE)
-    )
-    is_hidden = (number - lowest) * FINE_M > HIDDEN_M
-    number = np.where(is_hidden, lowest + round(SCATTER_M / FINE_M), number)
+    number = np.argmax(below >= np.maximum(QUANTILE * below[:, -1], 1)[:, None], axis=1)
     found[held] = low + (number + 0.5) * FINE_M
     return found
 

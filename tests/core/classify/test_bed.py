@@ -50,18 +50,6 @@ def test_a_cell_that_shows_only_a_rail_takes_the_bed_of_its_neighbours():
     np.testing.assert_allclose(height[hidden], 0.17, atol=0.02)
 
 
-def test_the_bed_is_found_where_rails_hide_most_of_it():
-    """In world 10906, a third rail and the rails of a track hide the bed between them for metres."""
-    rng = np.random.RandomState(6)
-    xyz = cloud(rng, per_cell=200)
-    xyz[:, 2] = rng.normal(0.0, 0.015, len(xyz))
-    hidden = (np.abs(xyz[:, 0] - 3.0) < 0.75) & (rng.random_sample(len(xyz)) < 0.94)
-    xyz[hidden, 2] = rng.uniform(0.1, 0.2, hidden.sum())
-    height, _ = heights(xyz)
-    off_m = (height - xyz[:, 2])[inner(xyz)]
-    assert np.abs(off_m - np.median(off_m)).max() < 0.06
-
-
 def test_the_slope_of_the_flattest_level_is_stated():
     rng = np.random.RandomState(3)
     ground, deck = cloud(rng), cloud(rng)[:900]
