@@ -9,6 +9,7 @@ side. Before that, the branch is the end of an arc or a straight blade; points b
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -31,13 +32,22 @@ ALIGNED_ROUNDS = 2
 """Further rounds in which strips are aligned: a step of 30 mm where strips meet has been drawn as a bend 2 m long, of
 which a round removes half."""
 
-PARTING = 0.7, 1.3, 3.0
-"""Distances between two axes, in head widths: from which most of the branch's head is free and its line thus reliable;
-from which the raster has a cell between the heads; and up to which the way they part shows where they touch."""
 
-BLUNT_PARTING = 1.5, 1.5, 6.0
-"""The same where heads are blunt: two ridges that are nearer are one, and the line of either is drawn away from the
-other, by 20 mm in images that blur by 4 cm."""
+class Apart(NamedTuple):
+    """Distances between the axes of two rails that part, in head widths.
+
+    From `free` on, most of the branch's head is free and its line thus reliable; from `drawn` on, the raster has a cell
+    between the heads; and up to `last`, the way they part shows where they touch.
+    """
+
+    free: float
+    drawn: float
+    last: float
+
+
+SHARP_APART, BLUNT_APART = Apart(0.7, 1.3, 3.0), Apart(1.5, 1.5, 6.0)
+"""These distances for sharp and for blunt heads, of which two ridges that are nearer are one: the line of either is
+drawn away from the other, by 20 mm in images that blur by 4 cm."""
 
 MIN_PART_M = 1.5
 """Shortest part that shows it: an eighth of the length in which the flattest switch opens by the width of a head."""
@@ -133,18 +143,18 @@ def slide_branches(network: LineNetwork, xyz: np.ndarray, head_width_m: float, b
     the blade. Where the points, `xyz` (k, 3) in order of x, show no head next to the stock rail there, it is a blade.
     Branches that part in any other way stay unchanged. `blunt` says whether the cloud blunts heads.
     """
-    sure, apart, parted = BLUNT_PARTING if blunt else PARTING
-    between_m, apart_m = ((start * head_width_m, parted * head_width_m) for start in (sure, apart))
+    apart = BLUNT_APART if blunt else SHARP_APART
+    free_m, drawn_m = ((first * head_width_m, apart.last * head_width_m) for first in (apart.free, apart.drawn))
     starts = [
         (number, end)
         for number, (node, stock, _) in enumerate(network.passes.tolist())
         for end in np.flatnonzero(network.ends.ravel() == node).tolist()
         if end // 2 != stock
     ]
-    partings = [_parting(network, end, number, apart_m) for number, end in starts]
+    partings = [_parting(network, end, number, drawn_m) for number, end in starts]
     counts = [np.zeros(2) if one is None else _points_of_arc(network, one, xyz, head_width_m) for one in partings]
     for (number, end), count in zip(starts, counts):
-        network = _slide(network, end, number, between_m, _power(count))
+        network = _slide(network, end, number, free_m, _power(count))
     return network.tidy()
 
 
