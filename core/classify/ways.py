@@ -124,8 +124,14 @@ def _figures_of(answers: Iterable[HasFigures]) -> SearchFigures:
     return sum((answer.figures for answer in answers), SearchFigures())
 
 
-def search_alike(parts: Sequence[Part], search: Callable[[Sequence[Part], Way], Iterable[Answer]]) -> Iterator[Answer]:
-    """Search all parts of a cloud, those that show most first, in the way that suits it."""
+def search_alike(
+    parts: Sequence[Part], search: Callable[[Sequence[Part], Way], Iterable[Answer]], of_images: bool = False
+) -> Iterator[Answer]:
+    """Search all parts of a cloud, those that show most first, in the way that suits it.
+
+    `of_images` says that nothing shows that a scanner measured the points. Heads that hardly stand out of their bed are
+    then searched for as ridges first: those of images have no edges, and what looks like one is a flank.
+    """
     found: list[Answer] = []
     done = 0  # number of parts that were searched; one that failed has no answer
 
@@ -150,6 +156,11 @@ def search_alike(parts: Sequence[Part], search: Callable[[Sequence[Part], Way], 
     if shows_clear(seen):
         yield from found
         yield from search(parts[done:], Way.SHARP)
-    else:
-        filled = list(search(parts, Way.FILLED))
-        yield from filled if length_m(_figures_of(filled)) > max(length_m(seen), SHARP_M) else found
+        return
+    if of_images:
+        blunt = list(search(parts, Way.BLUNT))
+        if length_m(_figures_of(blunt)) >= max(FOUND_AGAIN * length_m(seen), SHARP_M):
+            yield from blunt
+            return
+    filled = list(search(parts, Way.FILLED))
+    yield from filled if length_m(_figures_of(filled)) > max(length_m(seen), SHARP_M) else found

@@ -78,7 +78,7 @@ def find_rail_points(
     if not counts:
         raise _nothing_to_search(request, settings.guide)
     progress.status("Searching for rails")
-    search = Search(sorted_files, request.zero, settings, runner, searching)
+    search = Search(sorted_files, request.zero, settings, runner, searching, _seem_of_images(request))
     for found in search.all():
         if found.figures != SearchFigures():
             yield found
@@ -93,6 +93,7 @@ class Search:
     settings: Settings
     runner: Runner
     progress: Progress
+    of_images: bool = False
     searched: int = 0
 
     def all(self) -> Iterator[Found]:
@@ -100,7 +101,7 @@ class Search:
         counts, sources = counts_of(self.sorted_files), sources_among(self.sorted_files)
         blunt = blunt_sources({one: _fullest(own) for one, own in sources.items()}, self._seen)
         if not blunt:
-            yield from search_alike(_fullest(counts), self._alike)
+            yield from search_alike(_fullest(counts), self._alike, self.of_images)
             return
         for way in (Way.SHARP, Way.BLUNT):
             is_blunt = way is Way.BLUNT
@@ -219,9 +220,14 @@ def report(figures: SearchFigures, request: Request, progress: Progress) -> None
 
 def _as_from_images(request: Request) -> str:
     """Say that a cloud seems to be matched from images, if it does."""
-    if any(shows_scanner(header.path) for header in request.headers[:FEW_FILES]):
+    if not _seem_of_images(request):
         return ""
     return " (it seems to be matched from images, for no point has an intensity, a GPS time or a second return)"
+
+
+def _seem_of_images(request: Request) -> bool:
+    """Return whether the points of a cloud seem to be matched from images: none has what only a scanner measures."""
+    return not any(shows_scanner(header.path) for header in request.headers[:FEW_FILES])
 
 
 def sort_files(

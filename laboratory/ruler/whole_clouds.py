@@ -29,12 +29,16 @@ class Part(NamedTuple):
 
 
 def classify_cloud(
-    xyz: np.ndarray, settings: Settings, progress: Progress = SILENT, sources: np.ndarray | None = None
+    xyz: np.ndarray,
+    settings: Settings,
+    progress: Progress = SILENT,
+    sources: np.ndarray | None = None,
+    of_images: bool = False,
 ) -> Classified:
     """Find the points on railheads in a cloud of any size, (n, 3), of several sources, (n,) whole numbers, or of one.
 
     Metres count from the zero of the coordinate system, so that the squares do not depend on how files are cut. With a
-    guide, only points near it are given.
+    guide, only points near it are given. See `ways.search_alike` for `of_images`.
     """
     rail = np.zeros(len(xyz), dtype=bool)
     figures = SearchFigures()
@@ -60,7 +64,7 @@ def classify_cloud(
     blunt = blunt_sources({source: fullest(own == source) for source in np.unique(own).tolist()}, seen)
     mixed = bool(blunt)
     every, filling = np.ones(len(xyz), dtype=bool), np.isin(own, sorted(blunt))
-    parts = [search_alike(fullest(every), partial(search, which=every))]
+    parts = [search_alike(fullest(every), partial(search, which=every), of_images)]
     if mixed:
         parts = [search(fullest(which), way, which) for way, which in ((Way.SHARP, ~filling), (Way.BLUNT, filling))]
     for part in chain(*parts):

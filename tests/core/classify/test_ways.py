@@ -20,7 +20,7 @@ class Found(NamedTuple):
     figures: SearchFigures
 
 
-def ways(*parts, again=1.0, clear=1.0):
+def ways(*parts, again=1.0, clear=1.0, of_images=False):
     """Search parts and return in which way each was searched at last.
 
     They have lengths of sharp, of round, and of filled rails. Of the sharp ones, a share stands clear of the bed; of
@@ -34,7 +34,7 @@ def ways(*parts, again=1.0, clear=1.0):
             filled, blunt = SearchFigures(paired_m=sum(filled_m)), SearchFigures(paired_m=again * round_m)
             yield Found(part, way, {Way.SHARP: seen, Way.FILLED: filled, Way.BLUNT: blunt}[way])
 
-    found = list(search_alike(parts, search))
+    found = list(search_alike(parts, search, of_images))
     assert [one.part for one in found] == list(parts)
     return [one.way for one in found]
 
@@ -66,6 +66,14 @@ def test_all_parts_are_searched_in_one_way(parts, way):
 def test_a_cloud_whose_round_rails_are_no_ridges_of_a_surface_is_sharp(again, way):
     """A thin, wide beam rounds heads as images do, but its points are not a smooth surface."""
     assert ways(*[(6.0, 60.0)] * 9, again=again) == [way] * 9
+
+
+@pytest.mark.parametrize(("again", "way"), [(1.0, Way.BLUNT), (0.8, Way.BLUNT), (0.6, Way.FILLED)])
+def test_low_heads_of_images_are_ridges(again, way):
+    """In worlds 10988 and 11008, the search of filled tracks found flanks of the ridges, and no switch."""
+    low = [(9.0, 9.0, 30.0)] * 8
+    assert ways(*low, again=2 * again, clear=0.0, of_images=True) == [way] * 8
+    assert ways(*low, again=2 * again, clear=0.0) == [Way.FILLED] * 8
 
 
 @pytest.mark.parametrize(("round_m", "unsure_m", "blunt"), [(157.0, 29.0, True), (5.0, 200.0, False)])
