@@ -21,6 +21,10 @@ from .tops import HIGH_M, LOW_M, Grid, tops_of
 THIN_PER_M2 = 400.0
 """Points per square metre below which a square is thin: no scanner on a vehicle, or far from it."""
 
+VAULT_SHARE = 0.5
+"""Share of the points of a level above another one, in a coarse cell, that stand as high as rails, from which it is no
+bed: a rail has up to a third, with a guard rail half, and a vault, which no plane fits, two thirds and more."""
+
 LEAST_DENSE_M2 = 20.0
 """Area of a square that is not thin without which nothing just above the ballast is seen: 5 m of track."""
 
@@ -83,11 +87,23 @@ def classify_square(xyz: np.ndarray, settings: Settings) -> ByShape:
 
 def _in_reach(bed: Bed, height: np.ndarray, level: np.ndarray, settings: Settings) -> np.ndarray:
     """Return which points may show rails, (n,) bool, given their heights above the bed and their levels."""
-    in_reach = height <= HIGH_M
+    in_reach = (height <= HIGH_M) & ~_on_vault(bed, height, level)
     if settings.way is not Way.FILLED:
         return in_reach
     dense_m2 = COARSE_M**2 * np.count_nonzero(bed.coarse.count >= THIN_PER_M2 * COARSE_M**2)
     return in_reach & (level == 0) & (dense_m2 >= LEAST_DENSE_M2)  # the vault of a tunnel is as rough as ballast
+
+
+def _on_vault(bed: Bed, height: np.ndarray, level: np.ndarray) -> np.ndarray:
+    """Return which points are on a vault, (n,) bool: a level above another one, most of which is above its bed."""
+    above = np.flatnonzero(level > 0)
+    surface = bed.coarse.cell[above] + len(bed.coarse.count) * level[above].astype(np.int64)
+    number = np.unique(surface, return_inverse=True)[1].ravel()
+    on_vault = np.zeros(len(level), dtype=bool)
+    if len(above):
+        standing = np.bincount(number, height[above] > LOW_M)
+        on_vault[above] = (standing > VAULT_SHARE * np.bincount(number))[number]
+    return on_vault
 
 
 def _standing(shown: Shown, settings: Settings) -> Standing:

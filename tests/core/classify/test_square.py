@@ -31,6 +31,19 @@ def test_two_rails_are_labelled(angle):
     assert (found & on).sum() / found.sum() > 0.99
 
 
+@pytest.mark.parametrize("slope", [0.1, 0.4, 1.2])
+def test_a_vault_covers_no_rail(slope):
+    """In worlds 11024 and 11031, stones of the vault, as far above a plane as heads are, hid the rails below."""
+    rng = np.random.RandomState(4)
+    xyz, on = ballasted(rng)
+    vault = xyz[rng.random_sample(len(xyz)) < 0.5]
+    beside_m = turned(vault, 0.3)[1]
+    vault[:, 2] = 9.0 - slope * np.abs(beside_m) - 0.2 * slope * beside_m**2 + rng.normal(0, 0.03, len(vault))
+    found = classify_square(np.concatenate([xyz, vault]), SETTINGS).rail
+    assert found[: len(xyz)][on & inner(xyz, 8)].mean() > 0.95
+    assert found[len(xyz) :].mean() < 0.005
+
+
 def test_rails_are_labelled_where_next_to_nothing_of_the_ground_is_seen():
     """At grazing angles a scanner sees one face of each rail, and shadow behind it."""
     rng = np.random.RandomState(3)
