@@ -42,17 +42,7 @@ def sources_of(marks: np.ndarray) -> np.ndarray:
     They differ where the source ids differ; of points with the same id, those without times are of another source, as
     images have none.
     """
-    return marks.astype(np.int64) >> SLOT_BITS << 1 | _timed(marks)
-
-
-def are_of_scanner(marks: np.ndarray) -> bool:
-    """Return whether all points have times, given their marks, (n,), as only those of a scanner have."""
-    return bool(len(marks) and _timed(marks).all())
-
-
-def _timed(marks: np.ndarray) -> np.ndarray:
-    """Return which points have times, (n,) bool, by their marks."""
-    return (marks & (SLOTS - 1)) > 0
+    return marks.astype(np.int64) >> SLOT_BITS << 1 | ((marks & (SLOTS - 1)) > 0)
 
 
 def _slots(gps_time: np.ndarray | None, count: int) -> np.ndarray:

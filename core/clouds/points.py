@@ -16,8 +16,18 @@ from ..run.tasks import READ_S, Runner, Task
 from ..standards import LAST_CLASS
 from .crs import common_crs, is_geographic, name_of, parse_crs, units, utm_zone, warn_of_scale
 from .mask import Mask
-from .passes import are_of_scanner, number_passes
-from .readers import Chunk, CloudHeader, Extent, Paths, either, list_files, read_classes, read_header
+from .passes import number_passes
+from .readers import (
+    Chunk,
+    CloudHeader,
+    Extent,
+    Paths,
+    either,
+    list_files,
+    read_classes,
+    read_header,
+    shows_scanner,
+)
 
 Result = TypeVar("Result")
 
@@ -29,6 +39,9 @@ PLACE_M = 40.0
 
 MAX_PASSED = 5_000_000
 """Number of points of any class after which a sample ends."""
+
+FEW_FILES = 3
+"""Files whose first points are asked whether a scanner measured them."""
 
 STRETCH_M = 200.0
 """Length of line in a rectangle in which points along it are read."""
@@ -45,7 +58,7 @@ class RailPoints:
     `strips`, (n,), has the number of the strip, a pass of the scanner, that each point belongs to; None if all points
     are of one strip. If `found`, they are from a raw cloud, and not by their class: in a blunt one they are whole
     ridges. `blunt` says whether the cloud blunts heads, as its lines have shown; None before there are any. `scanned`
-    says whether times show that a scanner measured all points; those of images have none.
+    says whether a scanner is known to have measured them, and not a camera.
 
     Where the file states no strips and the heads have shown them, `apart`, (s, 4), has how far the strips 1 to s are
     off the mean of all passes, x, y and z, and the number of passes in each.
@@ -135,7 +148,7 @@ def read_requested(request: Request, progress: Progress = SILENT) -> tuple[RailP
     strips = strips_of(local, marks)
     classes = (codes == code for code in np.unique(codes))
     return tuple(
-        RailPoints(local[own], frame, int(codes[own][0]), several(strips[own]), scanned=are_of_scanner(marks[own]))
+        RailPoints(local[own], frame, int(codes[own][0]), several(strips[own]), scanned=request.is_scanned)
         for own in classes
     )
 
@@ -246,6 +259,11 @@ class Request:
             f"The cloud has no points of class {wanted}; its classes, with the number of points, are {found}: set the "
             f"rail classes or, if nobody has classified the cloud, CLASSIFY.{airborne}"
         )
+
+    @property
+    def is_scanned(self) -> bool:
+        """Whether points have what only a scanner measures, and not a camera; see `readers.shows_scanner`."""
+        return any(shows_scanner(header.path) for header in self.headers[:FEW_FILES])
 
     @property
     def is_airborne(self) -> bool:

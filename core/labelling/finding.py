@@ -19,7 +19,7 @@ from ..classify.tops import LOW_M
 from ..classify.ways import blunt_sources, search_alike
 from ..clouds.passes import sources_of
 from ..clouds.points import Request, read_each
-from ..clouds.readers import CloudHeader, read_points, shows_scanner
+from ..clouds.readers import CloudHeader, read_points
 from ..errors import CloudError, NoRailPointsError, ParameterError
 from ..frame import LocalFrame
 from ..learned.model import Classifier, label_square
@@ -36,9 +36,6 @@ POINT = np.dtype([("xyz", "<f8", 3), ("number", "<i8"), ("mark", "<u4")])
 
 SEARCH_S = 1e-6
 """Run time of the search per point, in seconds; a network takes ten times as long."""
-
-FEW_FILES = 3
-"""Files whose first points are asked whether a scanner measured them."""
 
 FEW_IN_SQUARE, MANY_SQUARES = 20, 100
 """Chunks of points that are spread over more squares than this, with fewer points in each, are not in the unit that the
@@ -78,7 +75,7 @@ def find_rail_points(
     if not counts:
         raise _nothing_to_search(request, settings.guide)
     progress.status("Searching for rails")
-    search = Search(sorted_files, request.zero, settings, runner, searching, _seem_of_images(request))
+    search = Search(sorted_files, request.zero, settings, runner, searching, not request.is_scanned)
     for found in search.all():
         if found.figures != SearchFigures():
             yield found
@@ -220,14 +217,9 @@ def report(figures: SearchFigures, request: Request, progress: Progress) -> None
 
 def _as_from_images(request: Request) -> str:
     """Say that a cloud seems to be matched from images, if it does."""
-    if not _seem_of_images(request):
+    if request.is_scanned:
         return ""
     return " (it seems to be matched from images, for no point has an intensity, a GPS time or a second return)"
-
-
-def _seem_of_images(request: Request) -> bool:
-    """Return whether the points of a cloud seem to be matched from images: none has what only a scanner measures."""
-    return not any(shows_scanner(header.path) for header in request.headers[:FEW_FILES])
 
 
 def sort_files(

@@ -106,7 +106,7 @@ def _parts(fact: Any) -> Iterable[bytes]:
     elif isinstance(fact, SpooledPoints):
         # The folders of the points are named after size and time of the files that the points come from.
         yield from _parts(sorted(Path(file).parts[-2:] for files in fact.files.values() for file in files))
-        yield from _parts((fact.passes, fact.blunt))
+        yield from _parts((fact.passes, fact.blunt, fact.scanned))
     elif is_dataclass(fact):
         for field in fields(fact):
             yield from _parts(getattr(fact, field.name))

@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from ..clouds.on_heads import heads_of
-from ..clouds.passes import are_of_scanner, number_passes
+from ..clouds.passes import number_passes
 from ..clouds.points import RailPoints, Request, origin_steps
 from ..clouds.readers import CloudHeader
 from ..disk import discard, scratch_folder, writing
@@ -115,7 +115,7 @@ class SpooledFile:
 
 @dataclass(frozen=True)
 class SpooledPoints:
-    """The points of one class on disk, a `PointSource`; `found` and `blunt` as in `RailPoints`.
+    """The points of one class on disk, a `PointSource`; `found`, `blunt` and `scanned` as in `RailPoints`.
 
     `files` hold the points of each square, one for each mark (see `passes.marks_of`), with which its name ends;
     `passes` has the number of the strip, a pass of the scanner, of each mark.
@@ -130,6 +130,7 @@ class SpooledPoints:
     passes: Mapping[int, int]
     found: bool = False
     blunt: bool | None = None
+    scanned: bool = False
     fills = False
 
     @property
@@ -143,11 +144,9 @@ class SpooledPoints:
         files = [file for key in keys for file in self.files.get(key, ())]
         parts = [_read(file, square, margin_m) for file in files]
         xyz = parts[0] if len(parts) == 1 else np.concatenate(parts or [np.empty((0, 3))])
-        marks = [key_of(file)[-1] for file in files]
-        strips = np.array([self.passes[mark] for mark in marks], dtype=np.int32)
+        strips = np.array([self.passes[key_of(file)[-1]] for file in files], dtype=np.int32)
         each = np.repeat(strips, [len(part) for part in parts]) if len(np.unique(strips)) > 1 else None
-        scanned = are_of_scanner(np.array(marks, dtype=np.int64))
-        points = RailPoints(xyz, square.frame, self.class_code, each, self.found, self.blunt, scanned=scanned)
+        points = RailPoints(xyz, square.frame, self.class_code, each, self.found, self.blunt, scanned=self.scanned)
         return heads_of(points)
 
     def judged(self, blunt: bool) -> SpooledPoints:
@@ -293,7 +292,8 @@ def gather(request: Request, side_m: float, found: Sequence[SpooledFile]) -> tup
     ]
     marks, *places = np.array(rows).T
     passes = number_passes(marks, np.column_stack(places))
-    return tuple(_source(code, found, frame, side_m, passes) for code in codes)
+    sources = (_source(code, found, frame, side_m, passes) for code in codes)
+    return tuple(replace(source, scanned=request.is_scanned) for source in sources)
 
 
 class Census:

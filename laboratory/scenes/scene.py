@@ -48,6 +48,8 @@ class Scene:
         Strip of each point; None if there is one only.
     times : (n,) array or None
         Seconds; None where the file states none.
+    intensity : (n,) uint16 array or None
+        As a scanner measures it; None where the file states none.
     """
 
     name: str
@@ -61,6 +63,7 @@ class Scene:
     gaps_m: float = 0.0
     strips: np.ndarray | None = None
     times: np.ndarray | None = None
+    intensity: np.ndarray | None = None
 
     def rail_points(self) -> RailPoints:
         """Return the points that `read_rail_points` would read from the file of the scene."""

@@ -32,7 +32,7 @@ TONES = np.array(
 def write_cloud(scene: Scene, path: Path) -> None:
     """Write a scene as LAS 1.4, compressed if the name ends in .laz."""
     known = {"classification": scene.classification, "point_source_id": scene.strips, "gps_time": scene.times}
-    _write(scene, path, 6, known)
+    _write(scene, path, 6, {**known, "intensity": scene.intensity})
 
 
 def write_raw(scene: RawScene, path: Path) -> None:

@@ -14,6 +14,7 @@ from ..scenes.raw_world import FASTENING, FOOT, GROUND, GUARD, HEAD, PAVEMENT, P
 from ..scenes.scene import GROUND as GROUND_CLASS
 from ..scenes.scene import RAIL, UNCLASSIFIED, Scene
 from ..scenes.whole_rails import ABOVE_M, BELOW_M, BESIDE_M, STEP_M
+from ..scenes.write import TONES
 from .draws import chosen, even_in_log, maybe, stream
 
 HEADS, FACES, WHOLE = "heads", "heads and faces", "whole rails"
@@ -147,6 +148,7 @@ def classified(scene: RawScene, how: Classification, seed: int, from_above: bool
         scene.other_gauges_m,
         strips=scene.strips,
         times=scene.times,
+        intensity=TONES[scene.kind] if scene.crests is None else None,
     )
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from rail_extract.core.clouds.passes import are_of_scanner, marks_of, number_passes, sources_of
+from rail_extract.core.clouds.passes import marks_of, number_passes, sources_of
 from rail_extract.core.clouds.points import ask, read_rail_points
 from rail_extract.core.tiles.grid import Square
 from rail_extract.core.tiles.store import spool
@@ -96,11 +96,3 @@ def test_a_source_is_an_id_at_all_times_and_points_without_times_are_of_another(
     found = [set(one.tolist()) for one in (*scanned, *images)]
     assert [len(one) for one in found] == [1, 1, 1, 1]
     assert len(set.union(*found)) == 4
-
-
-def test_times_of_all_points_show_that_a_scanner_measured_them():
-    ids = np.full(4, 7, np.uint16)
-    scanned, images = marks_of(ids, 0, np.full(4, START)), marks_of(ids, 0, np.zeros(4))
-    assert are_of_scanner(scanned)
-    assert not are_of_scanner(images) and not are_of_scanner(np.append(scanned, images))
-    assert not are_of_scanner(scanned[:0])

@@ -226,7 +226,7 @@ def test_source_ids_that_number_profiles_are_not_strips(tmp_path):
     cloud.point_source_id = np.arange(len(cloud)) % 60_000
     cloud.write(tmp_path / "a.laz")
     (points,) = read_rail_points(tmp_path / "a.laz", [RAIL])
-    assert points.strips is None
+    assert points.strips is None and not points.scanned
 
 
 def test_files_with_source_ids_of_their_own_are_strips(tmp_path):
