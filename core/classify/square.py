@@ -21,9 +21,10 @@ from .tops import HIGH_M, LOW_M, Grid, tops_of
 THIN_PER_M2 = 400.0
 """Points per square metre below which a square is thin: no scanner on a vehicle, or far from it."""
 
-VAULT_SHARE = 0.5
+VAULT_SHARE = 0.65
 """Share of the points of a level above another one, in a coarse cell, that stand as high as rails, from which it is no
-bed: a rail has up to a third, with a guard rail half, and a vault, which no plane fits, two thirds and more."""
+bed. A rail has a third, with a guard rail half, more on a viaduct that is seen at a grazing angle, and a vault, which
+no plane fits, two thirds and more."""
 
 LEAST_DENSE_M2 = 20.0
 """Area of a square that is not thin without which nothing just above the ballast is seen: 5 m of track."""
