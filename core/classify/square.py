@@ -21,10 +21,10 @@ from .tops import HIGH_M, LOW_M, Grid, tops_of
 THIN_PER_M2 = 400.0
 """Points per square metre below which a square is thin: no scanner on a vehicle, or far from it."""
 
-VAULT_SHARE = 0.65
-"""Share of the points of a level above another one, in a coarse cell, that stand as high as rails, from which it is no
-bed. A rail has a third, with a guard rail half, more on a viaduct that is seen at a grazing angle, and a vault, which
-no plane fits, two thirds and more."""
+VAULT_M, VAULT_SHARE = 0.25, 0.2
+"""Height above the bed that no rail on plates reaches, and share of the points of a level above another one, in a
+coarse cell, that are higher, from which it carries no rails: a vault, which no plane fits, has half of them there. What
+is seen of a viaduct at a grazing angle may be rails alone, but these are lower."""
 
 LEAST_DENSE_M2 = 20.0
 """Area of a square that is not thin without which nothing just above the ballast is seen: 5 m of track."""
@@ -96,14 +96,14 @@ def _in_reach(bed: Bed, height: np.ndarray, level: np.ndarray, settings: Setting
 
 
 def _on_vault(bed: Bed, height: np.ndarray, level: np.ndarray) -> np.ndarray:
-    """Return which points are on a vault, (n,) bool: a level above another one, most of which is above its bed."""
+    """Return which points are on a vault, (n,) bool: a level above another one that is too uneven for a bed."""
     above = np.flatnonzero(level > 0)
     surface = bed.coarse.cell[above] + len(bed.coarse.count) * level[above].astype(np.int64)
     number = np.unique(surface, return_inverse=True)[1].ravel()
     on_vault = np.zeros(len(level), dtype=bool)
     if len(above):
-        standing = np.bincount(number, height[above] > LOW_M)
-        on_vault[above] = (standing > VAULT_SHARE * np.bincount(number))[number]
+        high = np.bincount(number, (height[above] > VAULT_M) & (height[above] <= HIGH_M))
+        on_vault[above] = (high > VAULT_SHARE * np.bincount(number))[number]
     return on_vault
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import TypeVar
@@ -146,10 +147,9 @@ def read_requested(request: Request, progress: Progress = SILENT) -> tuple[RailP
     frame = request.frame_at([np.unique(column, return_counts=True) for column in origin_steps(xyz).T])
     local = frame.to_local(xyz)
     strips = strips_of(local, marks)
-    classes = (codes == code for code in np.unique(codes))
+    classes, scanned = (codes == code for code in np.unique(codes)), request.is_scanned()
     return tuple(
-        RailPoints(local[own], frame, int(codes[own][0]), several(strips[own]), scanned=request.is_scanned)
-        for own in classes
+        RailPoints(local[own], frame, int(codes[own][0]), several(strips[own]), scanned=scanned) for own in classes
     )
 
 
@@ -260,10 +260,22 @@ class Request:
             f"rail classes or, if nobody has classified the cloud, CLASSIFY.{airborne}"
         )
 
-    @property
     def is_scanned(self) -> bool:
-        """Whether points have what only a scanner measures, and not a camera; see `readers.shows_scanner`."""
-        return any(shows_scanner(header.path) for header in self.headers[:FEW_FILES])
+        """Return whether the first points of all files asked have what only a scanner measures."""
+        shown = self._show_scanner()
+        return bool(shown) and all(shown)
+
+    def is_of_images(self) -> bool:
+        """Return whether no first point of the files asked has what only a scanner measures."""
+        return not any(self._show_scanner())
+
+    def _show_scanner(self) -> list[bool]:
+        """Ask the first files, but those that can't be read; see `readers.shows_scanner`."""
+        found = []
+        for header in self.headers[:FEW_FILES]:
+            with suppress(CloudError):
+                found.append(shows_scanner(header.path))
+        return found
 
     @property
     def is_airborne(self) -> bool:

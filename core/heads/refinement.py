@@ -46,8 +46,8 @@ class Apart(NamedTuple):
 
 
 SHARP_APART, BLUNT_APART = Apart(0.7, 1.3, 3.0), Apart(1.5, 1.5, 6.0)
-"""These distances for sharp and for blunt heads, of which two ridges that are nearer are one: the line of either is
-drawn away from the other, by 20 mm in images that blur by 4 cm."""
+"""These distances for sharp and for blunt heads. Two blunt heads that are nearer are one ridge, and the line of either
+is drawn away from the other, by 20 mm in images that blur by 4 cm."""
 
 MIN_PART_M = 1.5
 """Shortest part that shows it: an eighth of the length in which the flattest switch opens by the width of a head."""
@@ -144,17 +144,19 @@ def slide_branches(network: LineNetwork, xyz: np.ndarray, head_width_m: float, b
     Branches that part in any other way stay unchanged. `blunt` says whether the cloud blunts heads.
     """
     apart = BLUNT_APART if blunt else SHARP_APART
-    free_m, drawn_m = ((first * head_width_m, apart.last * head_width_m) for first in (apart.free, apart.drawn))
+    free_range_m, drawn_range_m = (
+        (first * head_width_m, apart.last * head_width_m) for first in (apart.free, apart.drawn)
+    )
     starts = [
         (number, end)
         for number, (node, stock, _) in enumerate(network.passes.tolist())
         for end in np.flatnonzero(network.ends.ravel() == node).tolist()
         if end // 2 != stock
     ]
-    partings = [_parting(network, end, number, drawn_m) for number, end in starts]
+    partings = [_parting(network, end, number, drawn_range_m) for number, end in starts]
     counts = [np.zeros(2) if one is None else _points_of_arc(network, one, xyz, head_width_m) for one in partings]
     for (number, end), count in zip(starts, counts):
-        network = _slide(network, end, number, free_m, _power(count))
+        network = _slide(network, end, number, free_range_m, _power(count))
     return network.tidy()
 
 

@@ -1,7 +1,8 @@
-"""Rails in a street next to whose heads the road is classified as rail: the head is at the end that is at gauge.
+"""Rails in a street next to whose heads the road is classified as rail: the head is where the band is at gauge.
 
-The road lies level with the head, so that their points form one band and the head has a single edge, at the groove for
-the flanges. See docs/method.md section 6.9.
+The road lies level with the head, so that their points form one band. With road on one side, the head is at one end of
+it and has a single edge, at the groove for the flanges; with road on both sides, it is in the middle. See
+docs/method.md section 6.9.
 """
 
 from __future__ import annotations
@@ -88,7 +89,7 @@ def onto_heads(
     between the axes of the two rails of a track.
     """
     near = near_lines(lines, replace(points, strips=None), heads_m)
-    found = [_within(on_own_level(head)) for head in near]
+    found = [_band_of(on_own_level(head)) for head in near]
     candidates = [(line,) if band is None else band.lines for line, band in zip(lines, found)]
     return tuple(
         _at_gauge(line, band, candidates[:number] + candidates[number + 1 :], spacings_m)
@@ -107,8 +108,8 @@ class _Band:
     places: tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
-def _within(points: HeadPoints) -> _Band | None:
-    """Move a line onto either end of its band; None where the points form none that is wider than a head."""
+def _band_of(points: HeadPoints) -> _Band | None:
+    """Return the band of a line; None where the points form none that is wider than a head."""
     right_m, left_m, wide = _wide_bands(points)
     if not wide.any():
         return None

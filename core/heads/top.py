@@ -56,13 +56,14 @@ TAIL_M = 1.0
 """Length over which a profile is extrapolated with the slope at its end; beyond it is level."""
 
 LOWERED_SHARE, LOWERED_ERROR_SHARE = 0.25, 0.3
-"""By how much a beam lowers the crest of a blunt head, and its standard error, as shares of the fall of the head at the
-edge of the part that gives the height. A beam of half the head's width does not lower it, one as wide by 0.3 to 0.8 of
-the fall, which is 7 to 15 mm for both, because heads fall as much below a narrower beam above a deeper bed."""
+"""The mean amount by which a beam lowers the crest of a blunt head, and its standard error, as shares of the fall of
+the head at the edge of the part that gives the height. A beam of half the head's width does not lower the crest, and
+one as wide as the head lowers it by 0.3 to 0.8 of the fall. This fall is 7 to 15 mm below either beam, because heads
+fall as much below a narrower one above a deeper bed."""
 
 BLENDED_ERROR_M, BLENDED_SHARE = 0.002, 0.5
-"""Least standard error of the height of a blunt head, metres, and its share of this fall where images may blur it: what
-they show is not raised, because their blur may be of any size."""
+"""Least standard error of the height of any blunt head, metres, and its share of this fall where images may blur it:
+what they show is not raised, because their blur may be of any size."""
 
 LEAST_INFORMATION = 1e-6
 """Information about level, slope and fall of a crown that is always there, so that few points are enough."""
@@ -229,7 +230,7 @@ def fit_crown(points: HeadPoints) -> Crown:
 
 
 def _raised(crown: Crown, points: HeadPoints) -> Crown:
-    """Return the crown of a blunt head with what a beam lowers it, and with the error of that."""
+    """Return the crown of a blunt head with the mean amount by which a beam lowers it, and with the error of that."""
     fall_m = crown.bend * (AXIS_SHARE * points.width_m) ** 2
     share = LOWERED_ERROR_SHARE if points.scanned else BLENDED_SHARE
     lowered_m = LOWERED_SHARE * fall_m if points.scanned else 0.0

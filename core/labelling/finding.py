@@ -75,7 +75,7 @@ def find_rail_points(
     if not counts:
         raise _nothing_to_search(request, settings.guide)
     progress.status("Searching for rails")
-    search = Search(sorted_files, request.zero, settings, runner, searching, not request.is_scanned)
+    search = Search(sorted_files, request.zero, settings, runner, searching, request.is_of_images())
     for found in search.all():
         if found.figures != SearchFigures():
             yield found
@@ -217,7 +217,7 @@ def report(figures: SearchFigures, request: Request, progress: Progress) -> None
 
 def _as_from_images(request: Request) -> str:
     """Say that a cloud seems to be matched from images, if it does."""
-    if request.is_scanned:
+    if not request.is_of_images():
         return ""
     return " (it seems to be matched from images, for no point has an intensity, a GPS time or a second return)"
 

@@ -148,7 +148,7 @@ class Filling:
 
     def near(self, square: Square, margin_m: float) -> RailPoints:
         """See `PointSource`."""
-        points = replace(self.source.near(square, margin_m), scanned=False)  # those of a camera beside a scanner's
+        points = replace(self.source.near(square, margin_m), scanned=False)  # they may be a camera's
         if not self.lines:
             return points
         shift = square.frame.shift_to(self.frame)[:2]

@@ -292,8 +292,8 @@ def gather(request: Request, side_m: float, found: Sequence[SpooledFile]) -> tup
     ]
     marks, *places = np.array(rows).T
     passes = number_passes(marks, np.column_stack(places))
-    sources = (_source(code, found, frame, side_m, passes) for code in codes)
-    return tuple(replace(source, scanned=request.is_scanned) for source in sources)
+    scanned = request.is_scanned()
+    return tuple(replace(_source(code, found, frame, side_m, passes), scanned=scanned) for code in codes)
 
 
 class Census:

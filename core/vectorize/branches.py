@@ -206,20 +206,26 @@ def _touch(from_end: np.ndarray, line: np.ndarray) -> tuple[int, Bridge] | None:
 
 def _shared_m(from_end: np.ndarray, line: np.ndarray) -> float:
     """Measure the length, from its end inward, over which a line is drawn on another one: both share their cells."""
-    reach = np.abs(line - from_end[0]).max(axis=1) < MAX_BACK_M
-    if not reach.any():
-        return 0.0
-    points = even_points(from_end, MAX_BACK_M)
-    apart_m = cKDTree(even_points(line[reach])).query(points)[0]
+    apart_m = _apart_m(even_points(from_end, MAX_BACK_M), line)
     return STEP_M * int(np.argmax(np.append(apart_m, np.inf) > SHARED_M))
+
+
+def _apart_m(points: np.ndarray, line: np.ndarray) -> np.ndarray:
+    """Return the distances of points from a line, (n,) metres; infinite beyond its ends, and far from the first one."""
+    reach = np.abs(line - points[0]).max(axis=1) < MAX_BACK_M
+    if reach.sum() < 2:
+        return np.full(len(points), np.inf)
+    places = even_points(line[reach])
+    apart_m, nearest = cKDTree(places).query(points)
+    return np.where((nearest > 0) & (nearest < len(places) - 1), apart_m, np.inf)
 
 
 def _is_leg(from_end: np.ndarray, line: np.ndarray) -> bool:
     """Return whether a line, given from its end inward, is a straight leg of a crossing of another, not its branch."""
-    points = even_points(from_end, 2 * STEADY_M)
-    apart_m = cKDTree(even_points(line)).query(points)[0]
+    apart_m = _apart_m(even_points(from_end, 2 * STEADY_M), line)
     first = int(np.argmax(np.append(apart_m, np.inf) > PARTED_M))
     apart_m = apart_m[first:][: int(STEADY_M / STEP_M)]
+    apart_m = apart_m[np.isfinite(apart_m)]
     share = MUCH_STRAIGHTER if first else STRAIGHTER
     return len(apart_m) * STEP_M >= FIT_M and _is_straight(STEP_M * np.arange(len(apart_m)), apart_m, share)
 

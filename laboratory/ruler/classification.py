@@ -73,7 +73,7 @@ def score(scene: RawScene, wide: bool = False, weights: Path | None = None) -> t
     With `wide`, the beam is as wide as a head.
     """
     start = time.process_time()
-    of_images = scene.classification is not None and scene.strips is None
+    of_images = scene.classification is not None
     found = classify_cloud(scene.xyz, settings_of(scene, weights), sources=scene.strips, of_images=of_images)
     seconds = time.process_time() - start
     peak_mib = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024

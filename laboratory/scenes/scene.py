@@ -67,7 +67,8 @@ class Scene:
 
     def rail_points(self) -> RailPoints:
         """Return the points that `read_rail_points` would read from the file of the scene."""
-        return RailPoints(self.xyz, self.frame, RAIL, self.strips).kept(self.classification == RAIL)
+        points = RailPoints(self.xyz, self.frame, RAIL, self.strips, scanned=self.intensity is not None)
+        return points.kept(self.classification == RAIL)
 
 
 @dataclass(frozen=True)

@@ -57,6 +57,18 @@ def test_rails_are_labelled_where_next_to_nothing_of_the_ground_is_seen():
     assert (found & on).sum() / found.sum() > 0.95
 
 
+def test_rails_are_labelled_where_next_to_nothing_of_a_viaduct_but_some_ground_below_is_seen():
+    rng = np.random.RandomState(3)
+    xyz, on = ballasted(rng, size=12.0, per_m2=12_000)
+    left = turned(xyz, 0.3)[1]
+    face = on & (left - np.sign(left) * SPACING / 2 < -0.015)
+    seen = face | (rng.random_sample(len(xyz)) < 0.004)
+    below = xyz[rng.random_sample(len(xyz)) < 0.02] - [0.0, 0.0, 8.0]
+    on = on[seen]
+    found = classify_square(np.concatenate([xyz[seen], below]), SETTINGS).rail[: len(on)]
+    assert (found & on)[inner(xyz[seen], 10)].sum() / on[inner(xyz[seen], 10)].sum() > 0.9
+
+
 def test_the_edge_of_a_trough_of_whose_top_little_is_seen_is_no_rail():
     """A far scanner sees its face, and on its top a point here and there: each cell sees none or one of them."""
     rng = np.random.RandomState(22)

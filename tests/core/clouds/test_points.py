@@ -18,7 +18,7 @@ from rail_extract.core.errors import (
     EmptyCloudError,
     NoRailPointsError,
 )
-from rail_extract.laboratory.scenes.las import las_data
+from rail_extract.laboratory.scenes.las import las_data, write_las
 
 RAIL = 10
 UTM = "EPSG:32643"
@@ -237,3 +237,17 @@ def test_files_with_source_ids_of_their_own_are_strips(tmp_path):
         cloud.write(tmp_path / f"{number}.las")
     (points,) = read_rail_points(tmp_path, [RAIL])
     assert sorted(set(points.strips.tolist())) == [1, 2] and (np.diff(points.strips.astype(int)) >= 0).all()
+
+
+def test_files_that_cannot_be_read_do_not_say_whether_a_scanner_measured_the_points(tmp_path):
+    """A tolerant run leaves them out when it reads them."""
+    xyz = np.column_stack([np.arange(1000.0), np.zeros(1000), np.zeros(1000)])
+    for name, times in (("a.laz", np.arange(1000.0)), ("b.laz", np.arange(1000.0)), ("c.laz", np.zeros(1000))):
+        write_las(tmp_path / name, xyz, classification=RAIL, gps_time=times)
+    content = bytearray((tmp_path / "a.laz").read_bytes())
+    content[-600:-100] = bytes(500)
+    (tmp_path / "a.laz").write_bytes(content)
+    clouds = ("a.laz", "b.laz"), ("b.laz", "c.laz"), ("c.laz",)
+    scanned, mixed, images = (ask([tmp_path / name for name in names], [RAIL]) for names in clouds)
+    assert [one.is_scanned() for one in (scanned, mixed, images)] == [True, False, False]
+    assert [one.is_of_images() for one in (scanned, mixed, images)] == [False, False, True]

@@ -107,6 +107,19 @@ def test_a_straight_leg_of_a_crossing_is_no_branch(apart_m, radius, joined):
     assert sorted(network.degrees()) == ([1, 1, 1, 3] if joined else [1] * 4)
 
 
+@pytest.mark.parametrize(("radius", "joined"), [(np.inf, False), (190, True), (300, True)])
+def test_a_leg_of_a_crossing_that_a_check_rail_leads_to_the_rail_is_no_branch(radius, joined):
+    """In world 10927, the cloud ends in a crossing of 1:9, and the last 2 m of the leg are on the check rail."""
+    stock, x = along_x(0, 80), np.arange(0, 30, 0.1)
+    way = x / 9 if radius == np.inf else (x + np.sqrt(2 * radius * 0.15)) ** 2 / (2 * radius) - 0.15
+    way = np.maximum(0.15 + way, 0.2)
+    leg = np.column_stack([30 + x, 0.04 * np.round(way / 0.04)])
+    lines = (stock, leg[leg[:, 1] < 3.0])
+    loose = LineNetwork(lines, np.concatenate([line[[0, -1]] for line in lines]), np.arange(4).reshape(2, 2))
+    network = attach_branches(loose, cKDTree(np.concatenate(lines)), 20.0)
+    assert sorted(network.degrees()) == ([1, 1, 1, 3] if joined else [1] * 4)
+
+
 def test_a_branch_whose_end_is_drawn_on_a_rail_leaves_that_rail():
     """In world 10880 a join had drawn the rail again, and the branch was led to a rail that it crosses further back."""
     stock, crossed = along_x(0, 60), along_x(0, 60)
