@@ -88,22 +88,21 @@ def classify_square(xyz: np.ndarray, settings: Settings) -> ByShape:
 
 def _in_reach(bed: Bed, height: np.ndarray, level: np.ndarray, settings: Settings) -> np.ndarray:
     """Return which points may show rails, (n,) bool, given their heights above the bed and their levels."""
-    in_reach = (height <= HIGH_M) & ~_on_vault(bed, height, level)
+    in_reach = height <= HIGH_M
     if settings.way is not Way.FILLED:
-        return in_reach
+        return in_reach & ~_on_vault(bed, height, level)
     dense_m2 = COARSE_M**2 * np.count_nonzero(bed.coarse.count >= THIN_PER_M2 * COARSE_M**2)
     return in_reach & (level == 0) & (dense_m2 >= LEAST_DENSE_M2)  # the vault of a tunnel is as rough as ballast
 
 
 def _on_vault(bed: Bed, height: np.ndarray, level: np.ndarray) -> np.ndarray:
     """Return which points are on a vault, (n,) bool: a level above another one that is too uneven for a bed."""
-    above = np.flatnonzero(level > 0)
-    surface = bed.coarse.cell[above] + len(bed.coarse.count) * level[above].astype(np.int64)
-    number = np.unique(surface, return_inverse=True)[1].ravel()
+    above = np.flatnonzero(level)
+    surface = level[above].astype(np.int64) * len(bed.coarse.count) + bed.coarse.cell[above]
+    is_high = (height[above] > VAULT_M) & (height[above] <= HIGH_M)
+    uneven = np.bincount(surface, is_high) > VAULT_SHARE * np.bincount(surface)
     on_vault = np.zeros(len(level), dtype=bool)
-    if len(above):
-        high = np.bincount(number, (height[above] > VAULT_M) & (height[above] <= HIGH_M))
-        on_vault[above] = (high > VAULT_SHARE * np.bincount(number))[number]
+    on_vault[above] = uneven[surface]
     return on_vault
 
 

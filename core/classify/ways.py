@@ -145,12 +145,13 @@ def search_alike(
             seen = _figures_of(found)
         return seen
 
-    seen = seen_until(is_decided)
-    if is_blunt(seen):
-        blunt = list(search(parts[:done], Way.BLUNT))
+    seen, blunt = seen_until(is_decided), list[Answer]()
+    looked = done if is_blunt(seen) else 0
+    if looked:
+        blunt += search(parts[:looked], Way.BLUNT)
         if seen.paired_m <= max(length_m(_figures_of(blunt)) / FOUND_AGAIN, SHARP_M):
             yield from blunt
-            yield from search(parts[done:], Way.BLUNT)
+            yield from search(parts[looked:], Way.BLUNT)
             return
     seen = seen_until(shows_clear)
     if shows_clear(seen):
@@ -158,7 +159,7 @@ def search_alike(
         yield from search(parts[done:], Way.SHARP)
         return
     if of_images:
-        blunt = list(search(parts, Way.BLUNT))
+        blunt += search(parts[looked:], Way.BLUNT)
         if length_m(_figures_of(blunt)) >= max(FOUND_AGAIN * length_m(seen), SHARP_M):
             yield from blunt
             return

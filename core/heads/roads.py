@@ -104,8 +104,8 @@ class _Band:
     The head is in the middle where there is road on both sides of it.
     """
 
-    lines: tuple[np.ndarray, np.ndarray, np.ndarray]
-    places: tuple[np.ndarray, np.ndarray, np.ndarray]
+    lines: tuple[np.ndarray, ...]
+    places: tuple[np.ndarray, ...]
 
 
 def _band_of(points: HeadPoints) -> _Band | None:
@@ -119,8 +119,8 @@ def _band_of(points: HeadPoints) -> _Band | None:
         line + smooth_profile(stations, shift, SMOOTHING_M, along)[:, None] * Polyline(line).normals for shift in shifts
     )
     at = stations[wide & (stations <= along[-1])][:: int(PLACE_M / STATION_STEP_M)]
-    middle_places, left_places, right_places = (Polyline(one, along).at(at) for one in (line, left, right))
-    return _Band((line, left, right), (middle_places, left_places, right_places))
+    lines = (line, left, right)
+    return _Band(lines, tuple(Polyline(one, along).at(at) for one in lines))
 
 
 def _at_gauge(
@@ -132,7 +132,8 @@ def _at_gauge(
     """
     if band is None:
         return line
-    misses_m = [_miss(places, [line for lines in others for line in lines], spacings_m) for places in band.places]
+    every = [one for lines in others for one in lines]
+    misses_m = [_miss(places, every, spacings_m) for places in band.places]
     best, second = np.argsort(misses_m)[:2].tolist()
     if misses_m[best] > MAX_MISS_M or misses_m[second] - misses_m[best] < CLEARLY_M:
         return line

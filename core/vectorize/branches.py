@@ -173,8 +173,6 @@ def _touch(from_end: np.ndarray, line: np.ndarray) -> tuple[int, Bridge] | None:
     if Polyline(from_end).length_m - shared_m < FIT_M:
         return None
     from_end = cut_back(from_end, shared_m)
-    if _is_leg(from_end, line):
-        return None
     tip, outward = tip_and_direction(even_points(from_end, DIRECTION_M))
     axes = np.array([outward, [-outward[1], outward[0]]])
     x, y = axes @ (line - tip).T
@@ -187,7 +185,7 @@ def _touch(from_end: np.ndarray, line: np.ndarray) -> tuple[int, Bridge] | None:
         return None
     own_x, own_y = axes @ (even_points(from_end, min(STEADY_M, -x[0])) - tip).T
     apart_m = np.interp(own_x, np.maximum.accumulate(x), y) - own_y
-    if len(own_x) < MIN_POINTS or len(set(np.sign(apart_m))) > 1:
+    if len(own_x) < MIN_POINTS or len(set(np.sign(apart_m))) > 1 or _is_leg(from_end, line):
         return None
     arc = PartingLaw.fitted(-own_x, np.abs(apart_m), ARC)
     touch_m = -arc.way_at(MISFIT_M)
@@ -206,11 +204,11 @@ def _touch(from_end: np.ndarray, line: np.ndarray) -> tuple[int, Bridge] | None:
 
 def _shared_m(from_end: np.ndarray, line: np.ndarray) -> float:
     """Measure the length, from its end inward, over which a line is drawn on another one: both share their cells."""
-    apart_m = _apart_m(even_points(from_end, MAX_BACK_M), line)
+    apart_m = _distances_to(even_points(from_end, MAX_BACK_M), line)
     return STEP_M * int(np.argmax(np.append(apart_m, np.inf) > SHARED_M))
 
 
-def _apart_m(points: np.ndarray, line: np.ndarray) -> np.ndarray:
+def _distances_to(points: np.ndarray, line: np.ndarray) -> np.ndarray:
     """Return the distances of points from a line, (n,) metres; infinite beyond its ends, and far from the first one."""
     reach = np.abs(line - points[0]).max(axis=1) < MAX_BACK_M
     if reach.sum() < 2:
@@ -222,7 +220,7 @@ def _apart_m(points: np.ndarray, line: np.ndarray) -> np.ndarray:
 
 def _is_leg(from_end: np.ndarray, line: np.ndarray) -> bool:
     """Return whether a line, given from its end inward, is a straight leg of a crossing of another, not its branch."""
-    apart_m = _apart_m(even_points(from_end, 2 * STEADY_M), line)
+    apart_m = _distances_to(even_points(from_end, 2 * STEADY_M), line)
     first = int(np.argmax(np.append(apart_m, np.inf) > PARTED_M))
     apart_m = apart_m[first:][: int(STEADY_M / STEP_M)]
     apart_m = apart_m[np.isfinite(apart_m)]

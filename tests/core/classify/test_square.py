@@ -23,6 +23,15 @@ def ballasted(rng, angle=0.3, size=8.0, per_m2=2500):
     return rough(xyz, rng), on
 
 
+def at_grazing_angle(rng, ground):
+    """A track of which one face of each rail is seen, and a share of the ground; the points, and which are on rails."""
+    xyz, on = ballasted(rng, size=12.0, per_m2=12_000)
+    left = turned(xyz, 0.3)[1]
+    face = on & (left - np.sign(left) * SPACING / 2 < -0.015)
+    seen = face | (rng.random_sample(len(xyz)) < ground)
+    return xyz[seen], on[seen]
+
+
 @pytest.mark.parametrize("angle", [0.0, 0.3, np.pi / 4, 2.0])
 def test_two_rails_are_labelled(angle):
     xyz, on = ballasted(np.random.RandomState(1), angle)
@@ -46,12 +55,7 @@ def test_a_vault_covers_no_rail(slope):
 
 def test_rails_are_labelled_where_next_to_nothing_of_the_ground_is_seen():
     """At grazing angles a scanner sees one face of each rail, and shadow behind it."""
-    rng = np.random.RandomState(3)
-    xyz, on = ballasted(rng, size=12.0, per_m2=12_000)
-    left = turned(xyz, 0.3)[1]
-    face = on & (left - np.sign(left) * SPACING / 2 < -0.015)
-    seen = face | (rng.random_sample(len(xyz)) < 0.004)
-    xyz, on = xyz[seen], on[seen]
+    xyz, on = at_grazing_angle(np.random.RandomState(3), 0.004)
     found = classify_square(xyz, SETTINGS).rail
     assert (found & on)[inner(xyz, 10)].sum() / on[inner(xyz, 10)].sum() > 0.9
     assert (found & on).sum() / found.sum() > 0.95
@@ -59,14 +63,10 @@ def test_rails_are_labelled_where_next_to_nothing_of_the_ground_is_seen():
 
 def test_rails_are_labelled_where_little_of_a_viaduct_and_some_ground_below_is_seen():
     rng = np.random.RandomState(3)
-    xyz, on = ballasted(rng, size=12.0, per_m2=12_000)
-    left = turned(xyz, 0.3)[1]
-    face = on & (left - np.sign(left) * SPACING / 2 < -0.015)
-    seen = face | (rng.random_sample(len(xyz)) < 0.02)
-    below = xyz[rng.random_sample(len(xyz)) < 0.02] - [0.0, 0.0, 8.0]
-    on = on[seen]
-    found = classify_square(np.concatenate([xyz[seen], below]), SETTINGS).rail[: len(on)]
-    assert (found & on)[inner(xyz[seen], 10)].sum() / on[inner(xyz[seen], 10)].sum() > 0.9
+    xyz, on = at_grazing_angle(rng, 0.02)
+    ground, _ = ballasted(rng, size=12.0, per_m2=240)
+    found = classify_square(np.concatenate([xyz, ground - [0.0, 0.0, 8.0]]), SETTINGS).rail[: len(on)]
+    assert (found & on)[inner(xyz, 10)].sum() / on[inner(xyz, 10)].sum() > 0.9
 
 
 def test_the_edge_of_a_trough_of_whose_top_little_is_seen_is_no_rail():
