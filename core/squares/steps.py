@@ -213,6 +213,7 @@ def draw_lines(raster: RailRaster, parameters: Parameters, progress: Progress = 
         parameters.gap_angle_deg,
         parameters.min_length_m,
         progress,
+        [sum(gauge) for gauge in parameters.gauges],
     )
     return smooth_network(network, parameters.smoothing_xy_m, progress.span(1.0, 1.0))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -32,13 +33,15 @@ def vectorize(
     gap_angle_deg: float = Parameters.gap_angle_deg,
     min_length_m: float = Parameters.min_length_m,
     progress: Progress = SILENT,
+    spacings_m: Sequence[float] = (),
 ) -> LineNetwork:
     """Turn rail cells into lines: one per rail, straight through junctions and across gaps (docs/method.md section 4).
 
     The cells are those that FRPDF has cleaned. Detail at junctions that is smaller than the width of the railhead
     counts as noise. Ends at most `max_gap_m` apart are joined if each points at the other within `gap_angle_deg`. Lines
-    shorter than `min_length_m` are dropped unless they connect two junctions. The lines, in local metres, still have
-    the stairs of the raster; smooth them next.
+    shorter than `min_length_m` are dropped unless they connect two junctions. `spacings_m` are the distances between the
+    axes of a track's rails: they show which lines of a crossing continue each other, and where slips are. The lines,
+    in local metres, still have the stairs of the raster; smooth them next.
     """
     closed = close(raster, progress.span(0.0, 0.3))
     cells = pixel_set(closed.cells())
@@ -55,9 +58,9 @@ def vectorize(
     progress.set_fraction(0.6)
     progress.check()
     seen = cKDTree(closed.to_local(pixels.cells / 2))
-    network, slips = open_slips(clean_junctions(traced, head_width_m), seen)
+    network, slips = open_slips(clean_junctions(traced, head_width_m), seen, spacings_m)
     network = cut_bends(network, progress.span(0.6, 0.7))
-    network = follow_courses(network, seen, max_gap_m, gap_angle_deg, progress.span(0.7, 0.9))
+    network = follow_courses(network, seen, spacings_m, max_gap_m, gap_angle_deg, progress.span(0.7, 0.9))
     network = run_through(part_branches(add_curves(network, slips)))
     network = attach_branches(network, seen, max_gap_m, progress.span(0.9, 1.0))
     return _settle_ends(choose_routes(_drop_short(network, min_length_m)))

@@ -58,6 +58,10 @@ STEADY_M = 8.0
 STAIRS_LENGTH_M = 1.0
 """Shorter parts of a line show the direction of stairs."""
 
+AT_GAUGE_M = 0.045
+"""Largest distance from a place at gauge to the nearest cell of a partner: half the diagonal of a cell, and the stairs
+of the line."""
+
 STRAY_M = 0.012
 """Standard error of a steady line: a rail is anywhere in cells of 0.04 m, which is 0.04 m / √12 rms."""
 
@@ -85,7 +89,12 @@ from the axis of its rail."""
 
 
 def follow_courses(
-    network: LineNetwork, seen: cKDTree, max_gap_m: float, gap_angle_deg: float, progress: Progress = SILENT
+    network: LineNetwork,
+    seen: cKDTree,
+    spacings_m: Sequence[float],
+    max_gap_m: float,
+    gap_angle_deg: float,
+    progress: Progress = SILENT,
 ) -> LineNetwork:
     """Join the ends of lines that continue each other, through junctions, past bends and across gaps.
 
@@ -95,10 +104,11 @@ def follow_courses(
     is a branching, which stays, in one node; see `part_branches`.
 
     At most `max_gap_m` of a join is away from all cells, `seen`, and both ends point at each other within
-    `gap_angle_deg`. The network has no passes.
+    `gap_angle_deg`. `spacings_m` are the distances between the axes of a track's rails: a line whose partner is on its
+    left does not continue one whose partner is on its right. The network has no passes.
     """
     while True:
-        network, joined = _joined(network, _Joins(network, seen, max_gap_m, gap_angle_deg, progress))
+        network, joined = _joined(network, _Joins(network, seen, spacings_m, max_gap_m, gap_angle_deg, progress))
         if not joined:
             return weld_pairs(network, KINK_DEG)
 
@@ -111,9 +121,15 @@ class _Joins:
     """
 
     def __init__(
-        self, network: LineNetwork, seen: cKDTree, max_gap_m: float, gap_angle_deg: float, progress: Progress = SILENT
+        self,
+        network: LineNetwork,
+        seen: cKDTree,
+        spacings_m: Sequence[float],
+        max_gap_m: float,
+        gap_angle_deg: float,
+        progress: Progress = SILENT,
     ) -> None:
-        self.network, self.seen = network, seen
+        self.network, self.seen, self.spacings_m = network, seen, spacings_m
         self.max_gap_m, self.slope = max_gap_m, float(np.tan(np.radians(gap_angle_deg)))
         self.lengths = network.lengths()
         degrees = network.degrees()[network.ends].min(axis=1, initial=9)
@@ -186,7 +202,27 @@ class _Joins:
         own_m = np.abs(bends).max() * STEADY_M**2 / 36
         turn = float(np.sum(turns**2)) / np.radians(TURN_DEG) ** 2
         stray = unsteadiness(one, other, STEADY_M) ** 2 / (STRAY_M**2 + own_m**2)
-        return turn + stray + UNSEEN * gap_m / max(self.max_gap_m, STEP_M)
+        cost = turn + stray + UNSEEN * gap_m / max(self.max_gap_m, STEP_M)
+        return cost + FREE * self._changes_sides(one, other) if cost < 2 * FREE else np.inf
+
+    def _changes_sides(self, one: np.ndarray, other: np.ndarray) -> float:
+        """Return how surely, 0 to 1, two ways, given from their ends inward, have their partners on different sides."""
+        sides, other_sides = self._partners(one)[::-1], self._partners(other)
+        return min(max(sides), max(other_sides)) - max(min(pair) for pair in zip(sides, other_sides))
+
+    def _partners(self, way: np.ndarray) -> tuple[float, ...]:
+        """Return the shares of a way, up to `STEADY_M`, that have the other rail of a track on the left and right."""
+        points = even_points(way, STEADY_M)
+        if len(points) * STEP_M < STAIRS_LENGTH_M or not self.spacings_m:
+            return 0.0, 0.0
+        along = np.arange(len(points))
+        powers = np.vander(along, 3)
+        arc = np.linalg.lstsq(powers, points, rcond=None)[0]  # the stairs would turn the direction to the partner
+        ahead = 2 * np.outer(along, arc[0]) + arc[1]
+        left = np.column_stack([-ahead[:, 1], ahead[:, 0]]) / np.hypot(*ahead.T)[:, None]
+        beside = np.multiply.outer([1.0, -1.0], np.multiply.outer(self.spacings_m, left))
+        at_gauge = self.seen.query(powers @ arc + beside)[0] < AT_GAUGE_M
+        return tuple(at_gauge.mean(axis=2).max(axis=1).tolist())
 
     def _saved(self, ends: tuple[int, int]) -> float:
         """Return what the bridge between two ends saves by running along links, which it explains.

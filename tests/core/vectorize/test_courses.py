@@ -17,6 +17,9 @@ from scipy.spatial import cKDTree
 SLOPE = 1 / 12
 """Of both rails, one upwards and one downwards: they cross at 1:6."""
 
+SPACING_M = 1.507
+"""Distance between the axes of the rails of a track."""
+
 
 def leg(side, slope, first_m, aside_m=0.0, aside_length_m=3.0):
     """Draw a rail outward from near the crossing; wing rails draw it aside next to it."""
@@ -35,11 +38,10 @@ def network(legs, links, nodes):
     return LineNetwork(tuple(lines), np.array([*nodes, *tips], dtype=float), np.array(ends))
 
 
-def resolved(drawn):
+def resolved(drawn, spacings_m=(), seen=None):
     """Follow the courses of lines that cells show, with the longest gap and the angle of the defaults."""
-    return follow_courses(
-        cut_bends(drawn), cKDTree(np.concatenate(drawn.lines)), Parameters.max_gap_m, Parameters.gap_angle_deg
-    )
+    seen = seen or cKDTree(np.concatenate(drawn.lines))
+    return follow_courses(cut_bends(drawn), seen, spacings_m, Parameters.max_gap_m, Parameters.gap_angle_deg)
 
 
 def check_that_two_rails_cross(found):
@@ -147,6 +149,21 @@ def around_holes(holes_m, neck_m=0.3):
     return sides + necks, [(place, 0.0) for place in x]
 
 
+@pytest.mark.parametrize("number", [20, 25, 30])
+@pytest.mark.parametrize(("spacings_m", "crosses"), [((SPACING_M,), True), ((), False)])
+def test_rails_that_cross_flatly_stay_beside_their_partners(number, spacings_m, crosses):
+    """Wing rails that draw the legs apart turn their directions by as much as the angle at which the rails cross."""
+    slopes = 0.5 / number, -0.5 / number
+    legs = [(int(side > 0), leg(side, slope, 2.0, 0.05 * np.sign(side * slope), 6.0)) for side in (-1, 1) for slope in slopes]
+    drawn = network(legs, [(0, [(0.0, 0.0)], 1)], [(-1.8, 0.0), (1.8, 0.0)])
+    x = np.arange(-25.0, 25.0, 0.1)
+    partners = [np.column_stack([x, slope * x + np.sign(slope) * SPACING_M]) for slope in slopes]
+    found = resolved(drawn, spacings_m, cKDTree(np.concatenate([*map(even_points, drawn.lines), *partners])))
+    whole = [line for line in found.lines if np.ptp(line[:, 0]) > 45]
+    assert len(whole) == 2
+    assert all((line[0, 1] * line[-1, 1] < 0) == crosses for line in whole)
+
+
 @pytest.mark.parametrize("holes_m", [(0.5,), (1.5,), (0.6, 1.1)])
 def test_a_hole_in_a_rail_is_no_second_rail(holes_m):
     links, nodes = around_holes(holes_m)
@@ -194,7 +211,7 @@ def followed(line):
     sides = 0.036 * Polyline(line).normals
     network = LineNetwork((line,), line[[0, -1]], np.array([[0, 1]]))
     seen = cKDTree(np.concatenate([line + sides, line - sides]))
-    (only,) = follow_courses(cut_bends(network), seen, Parameters.max_gap_m, Parameters.gap_angle_deg).lines
+    (only,) = resolved(network, seen=seen).lines
     return only
 
 

@@ -28,17 +28,17 @@ def cells_of(lines):
     return cKDTree(CELL_M * np.unique(np.round(np.concatenate(heads) / CELL_M), axis=0))
 
 
-def opened(lines, seen=None):
+def opened(lines, seen=None, spacing_m=SPACING_M):
     ends = np.arange(2 * len(lines)).reshape(-1, 2)
     nodes = np.concatenate([line[[0, -1]] for line in lines])
-    return open_slips(LineNetwork(tuple(lines), nodes, ends), seen or cells_of(lines))
+    return open_slips(LineNetwork(tuple(lines), nodes, ends), seen or cells_of(lines), [spacing_m])
 
 
 @pytest.mark.parametrize(("number", "radius_m"), [(9.0, 190.0), (6.6, 117.0)])
 def test_a_slip_is_found_where_no_lines_meet(number, radius_m):
     network, slips = opened(lines_beside_a_slip(number, radius_m))
     np.testing.assert_allclose(sorted(slip.cross.place[1] for slip in slips), [0.0, SPACING_M], atol=0.02)
-    network = add_curves(follow_courses(network, cKDTree(np.concatenate(network.lines)), 5.0, 10.0), slips)
+    network = add_curves(follow_courses(network, cKDTree(np.concatenate(network.lines)), [SPACING_M], 5.0, 10.0), slips)
     assert len(network.lines) == 6
     straight = [line for line in network.lines if abs(line[-1, 1] - line[0, 1]) > 2.0]
     assert len(straight) == 4
@@ -67,8 +67,8 @@ def test_a_slip_curve_passes_the_crossing_as_its_radius_says(number, radius_m):
 @pytest.mark.parametrize(("number", "spacing_m"), [(5.3, SPACING_M), (7.5, 1.07), (8.25, 1.07)])
 def test_legs_of_the_other_crossing_are_not_taken_for_those_of_a_slip(number, spacing_m):
     lines = lines_beside_a_slip(number, 100.0, spacing_m)
-    network, slips = opened(lines)
-    drawn = add_curves(follow_courses(network, cells_of(lines), 5.0, 10.0), slips).lines
+    network, slips = opened(lines, spacing_m=spacing_m)
+    drawn = add_curves(follow_courses(network, cells_of(lines), [spacing_m], 5.0, 10.0), slips).lines
     assert sorted(round(np.ptp(line[:, 0])) for line in drawn if np.ptp(line[:, 0]) > 20) == [2 * LENGTH_M] * 4
 
 
@@ -91,12 +91,20 @@ def test_a_crossing_with_cells_on_its_axis_is_no_slip(number):
     assert len(network.lines) == 4
 
 
-@pytest.mark.parametrize(("hidden_m", "rails", "expected"), [(3.2, 1, 2), (3.2, 2, 0), (5.0, 1, 0)])
-def test_what_is_hidden_of_one_rail_of_a_slip_curve_the_other_shows(hidden_m, rails, expected):
-    """A curve of 117 m is apart from the rails that cross for 8 m; in world 10340, a third of one rail is hidden."""
+@pytest.mark.parametrize(
+    ("first_m", "last_m", "rails", "expected"), [(0.0, 3.2, 1, 2), (0.0, 3.2, 2, 2), (0.0, 5.0, 1, 2), (-5.0, 5.0, 2, 0)]
+)
+def test_a_slip_curve_is_found_if_half_of_it_is_seen(first_m, last_m, rails, expected):
+    """A curve of 117 m is apart from the rails that cross for 8 m."""
     lines = lines_beside_a_slip(6.6, 117.0)
     x, y = np.array(cells_of(lines).data).T
     curve_m = np.array([SPACING_M * number - 117.0 * (0.5 * np.arctan(1 / 6.6)) ** 2 / 2 for number in range(rails)])
-    hidden = (x > 0) & (x < hidden_m) & (np.abs(y[:, None] - curve_m).min(axis=1) < 0.15)
+    hidden = (x > first_m) & (x < last_m) & (np.abs(y[:, None] - curve_m).min(axis=1) < 0.15)
     _, slips = opened(lines, cKDTree(np.column_stack([x, y])[~hidden]))
     assert len(slips) == expected
+
+
+def test_without_rails_a_gauge_beside_a_crossing_it_is_no_slip():
+    network, slips = opened(lines_beside_a_slip()[:2])
+    assert not slips
+    assert len(network.lines) == 2
