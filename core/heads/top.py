@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from typing import Union
 
 import numpy as np
-from scipy.ndimage import grey_closing
+from scipy.ndimage import grey_closing, uniform_filter1d
 
 from ..lines.smoothing import VARIANCE_FACTOR, smooth_profile
 from ..rails import Support
@@ -46,8 +46,12 @@ SUNK_LENGTHS_M = (4.0, 6.0, 8.0, 12.0, 16.0)
 BESIDE_SUNK_M, MIN_BESIDE = 8.0, 16
 """Length of the course on either side of a window, and least number of stations there: half of them."""
 
-SUNK_ROUGH_M = 0.005
-"""Largest scatter of the stations there about the course (RMS): beyond it, some of them may be sunk as well."""
+SUNK_ROUGH_M, RAISED_ROUGH_M = 0.005, 0.012
+"""Largest scatter of the stations there about the course (RMS), of sharp heads and of ridges: beyond it, some of them
+may be sunk, or raised, as well."""
+
+RAISED_STATIONS = 5
+"""Stations of a ridge whose heights are averaged before."""
 
 PROFILE_BIN_M = 0.25
 """Bins along the line in which points are averaged: half the distance between the knots of the spline."""
@@ -167,7 +171,7 @@ def by_outline(top: Top, outline: Middles) -> Top:
     return replace(top, course=course, crown_m=np.interp(stations, t, course.followed(t, common_m, information[known])))
 
 
-def are_sunk(t: np.ndarray, z: np.ndarray) -> np.ndarray:
+def are_sunk(t: np.ndarray, z: np.ndarray, rough_m: float = SUNK_ROUGH_M) -> np.ndarray:
     """Return which heights at increasing chainages, (n,) metres, are not those of the top: both sides are higher.
 
     Far from the scanner, hardly any points are on the crown of a head, and those on the web take its place.
@@ -183,25 +187,42 @@ def are_sunk(t: np.ndarray, z: np.ndarray) -> np.ndarray:
             inside, beside = slice(begin - first, end - first), np.r_[: begin - first, end - first : last - first]
             here, powers = z[first:last], np.vander(t[first:last] - start_m, 3)
             off_m = here - powers @ np.linalg.lstsq(powers[beside], here[beside], rcond=None)[0]
-            if np.median(off_m[inside]) < -SUNK_M and np.std(off_m[beside]) < SUNK_ROUGH_M:
+            if np.median(off_m[inside]) < -SUNK_M and np.std(off_m[beside]) < rough_m:
                 sunk[begin:end] |= off_m[inside] < -SUNK_M / 2
     return sunk
 
 
 def by_lone_ridge(top: Top, smoothing_m: float | None, prior: Prior) -> Top:
-    """Take the height that a ridge shows where no other head is next to it: both are one ridge there, which is higher.
+    """Take the height that a ridge shows where it is alone and out of its bed.
 
-    An end that other heads are next to keeps what it shows.
+    Next to another head both are one ridge, which is higher, and in a pavement no blur lowers the head. An end that
+    other heads are next to keeps what it shows.
     """
-    alone = np.flatnonzero(top.points.alone)
-    if not len(alone) or len(alone) == len(top.points.t):
+    points = top.points
+    alone = np.flatnonzero(points.alone)
+    if not len(alone):
         return top
-    inner = np.arange(len(top.points.t))
-    chosen = top.points.within(AXIS_SHARE) & (top.points.alone | (inner < alone[0]) | (inner > alone[-1]))
+    inner = np.arange(len(points.t))
+    chosen = points.alone | (inner < alone[0]) | (inner > alone[-1])
+    chosen &= ~_raised_stations(top)[points.station]
+    if chosen.all():
+        return top
+    chosen &= points.within(AXIS_SHARE)
     if chosen.sum() < MIN_POINTS:
         return top
-    points, slope = top.points[chosen], top.slope[chosen]
-    return replace(top, course=smoothed(points.t, points.z - slope * points.across, smoothing_m, prior))
+    flat = points.z[chosen] - top.slope[chosen] * points.across[chosen]
+    return replace(top, course=smoothed(points.t[chosen], flat, smoothing_m, prior))
+
+
+def _raised_stations(top: Top) -> np.ndarray:
+    """Return at which stations a ridge is higher than on both sides, (s,) bool: it stands in a pavement there."""
+    count = top.points.per_station()
+    known = np.flatnonzero(count)
+    heights = top.points.per_station(top.points.z - top.slope * top.points.across)[known] / count[known]
+    raised = np.zeros(len(count), dtype=bool)
+    steady = uniform_filter1d(heights, RAISED_STATIONS)
+    raised[known] = are_sunk(top.points.stations[known], -steady, RAISED_ROUGH_M)
+    return raised
 
 
 def fit_crown(points: HeadPoints) -> Crown:

@@ -22,6 +22,13 @@ BALLAST = Bedding()
 BLENDED = 4.0
 """Distance between the axes of two rails, in standard deviations of the blur, from which each has its own ridge."""
 
+BESIDE_M, PAVED_M = 0.3, 0.02
+"""Distance beside the axis of a rail that shows what is around its head, and how far below its top that is, at most, in
+a pavement."""
+
+BEYOND_M = 2 * SLEEPER_STEP_M
+"""Distance from a pavement within which the mean over two sleepers and the blur contain it."""
+
 Thing = Callable[[World], None]
 
 
@@ -160,19 +167,30 @@ def crests_of(rails: tuple[np.ndarray, ...], line: Curve, surface: Surface, blur
     """Lay rails, (k, 3) each, as far below their tops as the blur of a surface lowers them.
 
     Where another rail is within `BLENDED` of the blur, in a switch, the surface is one ridge of both, higher than
-    either would be alone: what the rail shows on both sides of such a place is interpolated.
+    either would be alone; and in a level crossing nothing lowers it. As no rail rises by centimetres there, what it
+    shows on both sides of such a place is interpolated.
     """
     reach_m = BLENDED * blur_m
     lowered = []
     for number, rail in enumerate(rails):
         others = [Polyline(other[:, :2]).resampled(CELL_M).xy for other in rails[:number] + rails[number + 1 :]]
         alone = cKDTree(np.concatenate(others)).query(rail[:, :2])[0] > reach_m
-        shown = crest(rail, line, surface)
         along = length_along(rail[:, :2])
-        if alone.any():
-            shown[:, 2] = rail[:, 2] + np.interp(along, along[alone], (shown - rail)[alone, 2])
+        paved = along[_is_paved(rail, line, surface), None]
+        ridge = alone & (cKDTree(paved).query(along[:, None])[0] > BEYOND_M)
+        ridge = ridge if ridge.any() else alone
+        shown = crest(rail, line, surface)
+        if ridge.any():
+            shown[:, 2] = rail[:, 2] + np.interp(along, along[ridge], (shown - rail)[ridge, 2])
         lowered.append(shown)
     return tuple(lowered)
+
+
+def _is_paved(rail: np.ndarray, line: Curve, surface: Surface) -> np.ndarray:
+    """Return where a surface is as high on either side of a rail, (k, 3), as its top, (k,) bool."""
+    _, chainage, left = along_and_left(line, rail[:, :2])
+    beside = np.max([surface.at(chainage, left + side) for side in (-BESIDE_M, BESIDE_M)], axis=0)
+    return rail[:, 2] - beside < PAVED_M
 
 
 def crest(rail: np.ndarray, line: Curve, surface: Surface) -> np.ndarray:

@@ -21,9 +21,11 @@ MIXED = 15
 SECOND_ECHO = 0.3
 """Least share of the footprint that makes a second echo."""
 
-SUBRAYS = (-1.0, -0.5, 0.0, 0.5, 1.0)
-SUBRAY_WEIGHTS = (0.1, 0.2, 0.4, 0.2, 0.1)
-"""Rays that stand for a wide footprint, in halves of its width, and the share of the power in each."""
+SUBRAYS = tuple(np.arange(-6, 7) / 4)
+_POWER = np.exp(-2 * np.square(SUBRAYS))
+SUBRAY_WEIGHTS = tuple(_POWER / _POWER.sum())
+"""Rays that stand for a wide footprint, in halves of its width, and the share of the power in each: a Gaussian beam,
+whose width is given where its power falls to 1/e²."""
 
 
 @dataclass(frozen=True)

@@ -288,3 +288,14 @@ def test_a_head_that_wide_beams_of_a_scanner_lower_is_raised_by_some_of_that(bea
     lowered_m, raised_m = (height_error(elevated(network_of(straight_line(60)), one)[0])[0] for one in points)
     assert lowered_m < -0.003
     assert 0.7 * lowered_m < raised_m < 0.001
+
+
+@pytest.mark.parametrize(("length_m", "above_m"), [(6.0, 0.04), (8.0, 0.045), (10.0, 0.055)])
+def test_a_pavement_does_not_raise_the_ridge_that_images_show(length_m, above_m):
+    """Blur lowers a head between ballast by centimetres, and not one between pavement: no rail rises by that."""
+    rng = np.random.default_rng(3)
+    x, across = rng.uniform(0, 80, 3000), rng.uniform(-0.07, 0.07, 3000)
+    paved = np.abs(x - 40) < length_m / 2
+    z = np.where(paved, above_m, -5 * across**2) + rng.normal(0, 0.015, 3000)
+    (rail,) = elevated(network_of(straight_line(80)), cloud_of(np.column_stack([x, across, z])))
+    assert np.abs(rail.xyz[:, 2] - np.interp(40, [0, 80], rail.xyz[[0, -1], 2])).max() < 0.012

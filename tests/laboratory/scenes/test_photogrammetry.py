@@ -15,7 +15,7 @@ from rail_extract.laboratory.scenes.raw_photogrammetry import (
     misplaced,
 )
 from rail_extract.laboratory.scenes.raw_scanner import RawScanner
-from rail_extract.laboratory.scenes.raw_world import HEAD, ground, running_rails
+from rail_extract.laboratory.scenes.raw_world import HEAD, ground, pavement, running_rails
 from rail_extract.laboratory.scenes.write import write_raw
 
 STANDARD = STANDARDS["EN_60E1_1435"]
@@ -57,6 +57,21 @@ def test_rails_of_a_switch_are_as_far_below_their_tops_as_the_other_track():
     lowered_m = [np.percentile(rail[:, 2] - shown[:, 2], [10, 50, 90]) for rail, shown in zip(scene.rails, scene.shown)]
     assert np.ptp([median for _, median, _ in lowered_m]) < 0.003
     assert max(most - least for least, _, most in lowered_m) < 0.006
+
+
+def test_a_level_crossing_does_not_raise_the_rails_that_images_show():
+    """Blur lowers the heads between ballast by centimetres, and those between pavement not: the truth had a step."""
+
+    def crossing(world):
+        road = world.between(9.0, 16.0)
+        ground(world, where=~road)
+        running_rails(world, ~road)
+        pavement(world, road, (0.065, 0.06), 0.015)
+
+    scene = surveyed(Photogrammetry(blur_varies=0.0, wave_m=0.0, drift_m=0.0), [crossing], length_m=25.0)
+    lowered_m = scene.rails[0][:, 2] - scene.shown[0][:, 2]
+    assert lowered_m.min() > 0.02
+    assert np.ptp(lowered_m) < 0.006
 
 
 def test_two_epochs_share_the_place_and_have_errors_of_their_own():

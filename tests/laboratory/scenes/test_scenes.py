@@ -14,11 +14,13 @@ from rail_extract.laboratory.curves import Element, trace, transition_curve
 from rail_extract.laboratory.scenes.catalogue import SCENES
 from rail_extract.laboratory.scenes.frogs import FLANGEWAY_M, laid_together
 from rail_extract.laboratory.scenes.mixed import IMAGED, SCANNED, mixed
+from rail_extract.laboratory.scenes.raw_scanner import SUBRAY_WEIGHTS, SUBRAYS
 from rail_extract.laboratory.scenes.scanner import Scanner, head_outline, scan
 from rail_extract.laboratory.scenes.scene import RAIL
 from rail_extract.laboratory.scenes.tracks import Track
 from rail_extract.laboratory.scenes.write import read_truth
 from scipy.spatial import cKDTree
+from scipy.special import erfc
 
 SAMPLE = Path(__file__).parents[3] / "resources" / "sample"
 SPACING_M = 1.507
@@ -165,3 +167,12 @@ def test_a_mixed_cloud_has_its_rails_where_each_source_shows_them():
         assert length_along(sharp[:, :2])[-1] == pytest.approx(length_along(blunt[:, :2])[-1], abs=0.7)
         step = blunt[0] - sharp[-1]
         assert 0.01 < np.hypot(*step[:2]) < 0.2 and -0.06 < step[2] < 0.0
+
+
+def test_a_beam_as_wide_as_a_head_hits_the_bed_with_a_twentieth_of_its_power():
+    """Of a Gaussian beam that is 1 wide where its power falls to 1/e², erfc(√2) is further than 0.5 from its middle."""
+    beyond = np.abs(SUBRAYS) > 1
+    at_edge = np.abs(SUBRAYS) == 1
+    weights = np.array(SUBRAY_WEIGHTS)
+    assert weights.sum() == pytest.approx(1.0)
+    assert weights[beyond].sum() + weights[at_edge].sum() / 2 == pytest.approx(erfc(np.sqrt(2)), abs=0.006)
