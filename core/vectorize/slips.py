@@ -185,9 +185,7 @@ class Slip:
         return None if turns or off_m > STRAY_M else int(x * y > 0)
 
 
-def open_slips(
-    network: LineNetwork, seen: cKDTree, spacings_m: Sequence[float]
-) -> tuple[LineNetwork, list[Slip]]:
+def open_slips(network: LineNetwork, seen: cKDTree, spacings_m: Sequence[float]) -> tuple[LineNetwork, list[Slip]]:
     """Draw the crossings inside slips as two straight lines that cross, and find the slip curves.
 
     The lines have no passes, `seen` holds the places of rail cells, and `spacings_m` are the distances between the axes

@@ -154,7 +154,8 @@ def around_holes(holes_m, neck_m=0.3):
 def test_rails_that_cross_flatly_stay_beside_their_partners(number, spacings_m, crosses):
     """Wing rails that draw the legs apart turn their directions by as much as the angle at which the rails cross."""
     slopes = 0.5 / number, -0.5 / number
-    legs = [(int(side > 0), leg(side, slope, 2.0, 0.05 * np.sign(side * slope), 6.0)) for side in (-1, 1) for slope in slopes]
+    ways = [(side, slope) for side in (-1, 1) for slope in slopes]
+    legs = [(int(side > 0), leg(side, slope, 2.0, 0.05 * np.sign(side * slope), 6.0)) for side, slope in ways]
     drawn = network(legs, [(0, [(0.0, 0.0)], 1)], [(-1.8, 0.0), (1.8, 0.0)])
     x = np.arange(-25.0, 25.0, 0.1)
     partners = [np.column_stack([x, slope * x + np.sign(slope) * SPACING_M]) for slope in slopes]

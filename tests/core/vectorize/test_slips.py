@@ -92,7 +92,8 @@ def test_a_crossing_with_cells_on_its_axis_is_no_slip(number):
 
 
 @pytest.mark.parametrize(
-    ("first_m", "last_m", "rails", "expected"), [(0.0, 3.2, 1, 2), (0.0, 3.2, 2, 2), (0.0, 5.0, 1, 2), (-5.0, 5.0, 2, 0)]
+    ("first_m", "last_m", "rails", "expected"),
+    [(0.0, 3.2, 1, 2), (0.0, 3.2, 2, 2), (0.0, 5.0, 1, 2), (-5.0, 5.0, 2, 0)],
 )
 def test_a_slip_curve_is_found_if_half_of_it_is_seen(first_m, last_m, rails, expected):
     """A curve of 117 m is apart from the rails that cross for 8 m."""
