@@ -106,7 +106,7 @@ class _Cross:
         return cls(place, np.array([along, [-along[1], along[0]]]), half_angle)
 
     def beside(self, spacing_m: float) -> _Cross:
-        """Return where the other rails of both tracks cross, whose axes are so far to the left, or to the right."""
+        """Return where the other rails of both tracks cross: `spacing_m` to the left, or to the right if negative."""
         return replace(self, place=self.place + spacing_m / np.cos(self.half_angle) * self.axes[1])
 
     def legs(self, clear_m: float) -> np.ndarray:
