@@ -67,9 +67,9 @@ HALF_HEAD_M = 0.036
 BIN_M, COVER_M = 0.01, 0.25
 """Bins of the distance between the curve and the crossing, and of the length along the curve."""
 
-MIN_COVERED = 0.5
+MIN_COVERED = 0.4
 """Least share of the length in the middle of both rails of a slip curve on which there are cells. In 242 rasters of
-worlds with switches, those of slips have 0.52 and more, and what else looks like one has less than 0.35."""
+worlds with switches, those of slips have 0.52 and more, and whatever else has four legs less than 0.12."""
 
 MIN_LEGS = 0.9
 """Share of the legs of the other two rails that have cells: where these cross is known from the gauge alone."""
