@@ -224,33 +224,40 @@ class _Joins:
         at_gauge = self.seen.query(powers @ arc + beside)[0] < AT_GAUGE_M
         return tuple(at_gauge.mean(axis=2).max(axis=1).tolist())
 
-    def _saved(self, ends: tuple[int, int]) -> float:
+    def _saved(self, ends: tuple[int, int], used: Collection[int] = ()) -> float:
         """Return what the bridge between two ends saves by running along links, which it explains.
 
         A link that is left out costs something because nothing explains it. Two rails that cross do, half of it each.
+        Those that are `used` are not left out.
         """
         points = self.bridges[ends].points
         if not len(points):
             return 0.0
         near_m, nearest = self.drawn.query(points)
         number = self.number[nearest]
-        own = (number == ends[0] // 2) | (number == ends[1] // 2)
+        own = np.isin(number, [ends[0] // 2, ends[1] // 2, *used])
         return 0.5 * LINK_PER_M * STEP_M * np.count_nonzero((near_m < UNSEEN_M) & self.is_link[number] & ~own)
 
     def chosen(self) -> list[tuple[int, int]]:
         """List the joins that together cost least."""
+        pairs = best_pairs(self._gains())
+        used = [number for number in np.flatnonzero(self.is_link).tolist() if (2 * number, 2 * number + 1) not in pairs]
+        return sorted(ends for ends in best_pairs(self._gains(used)) if ends in self.costs)
+
+    def _gains(self, used: Collection[int] = ()) -> dict[tuple[int, int], float]:
+        """Return what each join gains, and each piece that no join uses; see `_saved` for the links that are `used`."""
         free = np.where(self.is_link, HALF_USED, FREE)
         free_ends = (self.network.degrees()[self.network.ends] == 1).sum(axis=1)
         per_m = np.where(self.is_link, LINK_PER_M, np.where(free_ends == 2, ALONE_PER_M, STUB_PER_M))
         gains = {
-            ends: free[ends[0] // 2] + free[ends[1] // 2] - cost + self._saved(ends)
+            ends: free[ends[0] // 2] + free[ends[1] // 2] - cost + self._saved(ends, used)
             for ends, cost in self.costs.items()
         }
         for number in np.flatnonzero(self.lengths < MAX_MERGED_M).tolist():
             # The free end of a piece that ends in a node is the end of a rail, whether it is used or not.
             saved = free[number] * (1 if free_ends[number] == 1 else 2)
             gains[2 * number, 2 * number + 1] = saved - per_m[number] * self.lengths[number]
-        return sorted(ends for ends in best_pairs(gains) if ends in self.costs)
+        return gains
 
 
 def _joined(network: LineNetwork, joins: _Joins) -> tuple[LineNetwork, bool]:
