@@ -61,9 +61,8 @@ TAIL_M = 1.0
 
 LOWERED_SHARE, LOWERED_ERROR_SHARE = 0.25, 0.3
 """The mean amount by which a beam lowers the crest of a blunt head, and its standard error, as shares of the fall of
-the head at the edge of the part that gives the height. A Gaussian beam 0.8 times as wide as the head lowers its crest by
-0.13 of this fall, one as wide by 0.4, and one 1.2 times as wide by 0.85. The fall is a tenth of the depth of the bed
-below all of them."""
+the head at the edge of the part that gives the height. Gaussian beams of 0.8, 1 and 1.2 head widths lower its crest by
+0.13, 0.4 and 0.85 of this fall, which is a tenth of the depth of the bed below all of them."""
 
 BLENDED_ERROR_M, BLENDED_SHARE = 0.002, 0.5
 """Least standard error of the height of any blunt head, metres, and its share of this fall where images may blur it:

@@ -31,7 +31,7 @@ def leg(side, slope, first_m, aside_m=0.0, aside_length_m=3.0):
 def network(legs, links, nodes):
     """Join legs, each with the node that it begins in, and links between two nodes."""
     lines = [np.concatenate([[nodes[node]], line]) for node, line in legs]
-    lines += [np.vstack([nodes[one], *middle, nodes[other]]).astype(float) for one, middle, other in links]
+    lines += [np.vstack([nodes[one], middle, nodes[other]]).astype(float) for one, middle, other in links]
     tips = [line[-1] for _, line in legs]
     ends = [(node, len(nodes) + number) for number, (node, _) in enumerate(legs)]
     ends += [(one, other) for one, _, other in links]
