@@ -55,7 +55,7 @@ def _rule(name: str, value: Any, *also: tuple[str, str, Any]) -> Switch:
 
 
 SWITCHES = (
-    _rule("vectorize.open_slips", lambda network, seen: (network, [])),
+    _rule("vectorize.open_slips", lambda network, *_: (network, [])),
     _rule("vectorize.cut_bends", first),
     _rule("vectorize.follow_courses", first),
     _rule("vectorize.courses.CUTS_M", (0.0,)),
@@ -63,7 +63,8 @@ SWITCHES = (
     _rule("vectorize.part_branches", first),
     _rule("vectorize.choose_routes", first),
     _rule("vectorize._settle_ends", first),
-    _rule("vectorize.slips._paired", lambda found: list(found)),
+    _rule("vectorize.courses.AT_GAUGE_M", -1.0),
+    _rule("heads.top._raised_stations", lambda top: np.zeros(len(top.points.stations), dtype=bool)),
     _rule("lines.ends._astray", lambda *_: 0),
     _rule("squares.steps.drawn", lambda *_: np.empty((0, 2))),
     _rule("vectorize.close", first),

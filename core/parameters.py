@@ -122,6 +122,11 @@ class Parameters:
         """Gauges that tracks may have; the first one is that of the standard."""
         return self.gauge_m, *self.other_gauges_m
 
+    @property
+    def spacings_m(self) -> list[float]:
+        """Distances between the axes of the rails of a track, by gauge."""
+        return [sum(gauge) for gauge in self.gauges]
+
     def with_gauges(self, others: Sequence[tuple[float, float]]) -> Parameters:
         """Return the parameters with further gauges, given with the width of their railheads."""
         gauges_m, heads_m = (tuple(one[part] for one in others) for part in range(2))

@@ -320,7 +320,7 @@ def warn_of_other_spacing(xyz: np.ndarray, parameters: Parameters, progress: Pro
     """Warn the user if rail points, (n, 3) in metres, show another gauge; return whether they do."""
     spacings = measure_spacings(xyz)
     measured = spacings.most_common()
-    spacings_m, tolerance_m = [sum(one) for one in parameters.gauges], parameters.centerline_tolerance_m
+    spacings_m, tolerance_m = parameters.spacings_m, parameters.centerline_tolerance_m
     if any(spacings.include(one, tolerance_m) for one in spacings_m):
         return False
     for factor, stated, real in zip(FEET, ("metres", "feet"), ("feet", "metres")):

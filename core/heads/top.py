@@ -51,7 +51,7 @@ SUNK_ROUGH_M, RAISED_ROUGH_M = 0.005, 0.012
 may be sunk, or raised, as well."""
 
 RAISED_STATIONS = 5
-"""Stations of a ridge whose heights are averaged before."""
+"""Number of stations over which the heights of a ridge are averaged before raised ones are looked for."""
 
 PROFILE_BIN_M = 0.25
 """Bins along the line in which points are averaged: half the distance between the knots of the spline."""
@@ -173,7 +173,8 @@ def by_outline(top: Top, outline: Middles) -> Top:
 def are_sunk(t: np.ndarray, z: np.ndarray, rough_m: float = SUNK_ROUGH_M) -> np.ndarray:
     """Return which heights at increasing chainages, (n,) metres, are not those of the top: both sides are higher.
 
-    Far from the scanner, hardly any points are on the crown of a head, and those on the web take its place.
+    Far from the scanner, hardly any points are on the crown of a head, and those on the web take its place. Where the
+    heights beside scatter by more than `rough_m` about their course, nothing is known.
     """
     sunk = np.zeros(len(t), dtype=bool)
     first_m, last_m = (t[0] + BESIDE_SUNK_M, t[-1] - BESIDE_SUNK_M) if len(t) else (0.0, 0.0)

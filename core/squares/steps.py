@@ -87,8 +87,7 @@ def clean_square(
 
 def _seen(points: np.ndarray, parameters: Parameters, cell_m: float) -> np.ndarray:
     """Return what the network sees, (n, 2) local metres: points, (m, 3), and places along thin rails."""
-    spacings_m = [gauge_m + head_m for gauge_m, head_m in parameters.gauges]
-    return np.concatenate([points[:, :2], drawn(points, spacings_m, cell_m)])
+    return np.concatenate([points[:, :2], drawn(points, parameters.spacings_m, cell_m)])
 
 
 def rails_of_square(
@@ -213,7 +212,7 @@ def draw_lines(raster: RailRaster, parameters: Parameters, progress: Progress = 
         parameters.gap_angle_deg,
         parameters.min_length_m,
         progress,
-        [sum(gauge) for gauge in parameters.gauges],
+        parameters.spacings_m,
     )
     return smooth_network(network, parameters.smoothing_xy_m, progress.span(1.0, 1.0))
 
@@ -241,8 +240,7 @@ def measure_lines(
         return flat_rails(network, class_code, elevation), rows_of((), ()), None
     drawn = [flat_rail(line, class_code) for line in network.lines]
     heads = widths_by_gauge(drawn, parameters.gauges, parameters.centerline_tolerance_m)
-    spacings_m = [sum(gauge) for gauge in parameters.gauges]
-    network = replace(network, lines=onto_heads(network.lines, points, heads, spacings_m))
+    network = replace(network, lines=onto_heads(network.lines, points, heads, parameters.spacings_m))
     settings = parameters.smoothing_xy_m, refining, elevation.align, cell_m
     if points.blunt:  # or so they look: two sharp passes that are apart make a ridge together
         points = told_apart(points, network.lines, heads)

@@ -40,8 +40,8 @@ def vectorize(
     The cells are those that FRPDF has cleaned. Detail at junctions that is smaller than the width of the railhead
     counts as noise. Ends at most `max_gap_m` apart are joined if each points at the other within `gap_angle_deg`. Lines
     shorter than `min_length_m` are dropped unless they connect two junctions. `spacings_m`, the distances between the
-    axes of a track's rails, show which lines of a crossing continue each other, and where slips are. The lines, in
-    local metres, still have the stairs of the raster; smooth them next.
+    axes of a track's rails, show which lines of a crossing continue each other, and where slips are; without them, no
+    slips are found. The lines, in local metres, still have the stairs of the raster; smooth them next.
     """
     closed = close(raster, progress.span(0.0, 0.3))
     cells = pixel_set(closed.cells())

@@ -70,7 +70,7 @@ TURN_DEG = 4.0
 
 FREE = 4.0
 """Cost of an end that nothing continues, in squares of standard errors: two ends are joined up to √7.5 of them, 33 mm
-off one curve."""
+off one curve. A join that changes the side of the partner costs as much."""
 
 HALF_USED = 1000.0
 """Cost of a free end of a link that is used: more than all that speaks for using it."""
@@ -210,8 +210,8 @@ class _Joins:
         sides, other_sides = self._partners(one)[::-1], self._partners(other)
         return min(max(sides), max(other_sides)) - max(min(pair) for pair in zip(sides, other_sides))
 
-    def _partners(self, way: np.ndarray) -> tuple[float, ...]:
-        """Return the shares of a way, up to `STEADY_M`, that have the other rail of a track on the left and right."""
+    def _partners(self, way: np.ndarray) -> tuple[float, float]:
+        """Return the shares of a way, up to `STEADY_M`, that have the other rail of a track on its left and right."""
         points = even_points(way, STEADY_M)
         if len(points) * STEP_M < STAIRS_LENGTH_M or not self.spacings_m:
             return 0.0, 0.0
@@ -222,7 +222,8 @@ class _Joins:
         left = np.column_stack([-ahead[:, 1], ahead[:, 0]]) / np.hypot(*ahead.T)[:, None]
         beside = np.multiply.outer([1.0, -1.0], np.multiply.outer(self.spacings_m, left))
         at_gauge = self.seen.query(powers @ arc + beside)[0] < AT_GAUGE_M
-        return tuple(at_gauge.mean(axis=2).max(axis=1).tolist())
+        left_share, right_share = at_gauge.mean(axis=2).max(axis=1).tolist()
+        return left_share, right_share
 
     def _saved(self, ends: tuple[int, int], used: Collection[int] = ()) -> float:
         """Return what the bridge between two ends saves by running along links, which it explains.
@@ -239,7 +240,11 @@ class _Joins:
         return 0.5 * LINK_PER_M * STEP_M * np.count_nonzero((near_m < UNSEEN_M) & self.is_link[number] & ~own)
 
     def chosen(self) -> list[tuple[int, int]]:
-        """List the joins that together cost least."""
+        """List the joins that together cost about least.
+
+        Which links are left out is only known once joins have been chosen, so they are chosen twice: what the joins of
+        the first choice use saves others nothing in the second.
+        """
         pairs = best_pairs(self._gains())
         used = [number for number in np.flatnonzero(self.is_link).tolist() if (2 * number, 2 * number + 1) not in pairs]
         return sorted(ends for ends in best_pairs(self._gains(used)) if ends in self.costs)

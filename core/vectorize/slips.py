@@ -27,7 +27,7 @@ CLEAR_SHARE = 0.7
 """Smallest part of the tangent length at which they are: a slip curve of 190 m at 1:9 touches the legs at 10.5 m and is
 26 mm from them at 7.4 m. The frogs are at 13.6 m."""
 
-SAME_M = 0.5
+SAME_M = 0.3
 """Crossings this close to each other are one: those of the two rails of a track are a gauge apart."""
 
 NODE_M, NEAR_M = 4.0, 1.5
@@ -67,16 +67,18 @@ HALF_HEAD_M = 0.036
 BIN_M, COVER_M = 0.01, 0.25
 """Bins of the distance between the curve and the crossing, and of the length along the curve."""
 
-MIN_COVERED = 0.4
-"""Least share of the length in the middle of both rails of a slip curve on which there are cells. In 242 rasters of
-worlds with switches, those of slips have 0.52 and more, and whatever else has four legs less than 0.12."""
+MIN_COVERED, MIN_COVERED_OF_ONE = 0.4, 0.2
+"""Least share of the length in the middle of a slip curve on which there are cells: the mean of both of its rails, and
+of either rail, for on narrow gauges one of them alone may look like a rail of the curve on the other side. In 242
+rasters of worlds with switches, the mean of slips is 0.52 and more, and that of whatever else has four legs less than
+0.12."""
 
 MIN_LEGS = 0.9
 """Share of the legs of the other two rails that have cells: where these cross is known from the gauge alone."""
 
 
 class Curve(NamedTuple):
-    """Both rails of a slip curve: how far from the crossings they pass, and on which side, 1 for the left."""
+    """A slip curve: how far from the crossing of either rail it passes, and on which side, 1 for the left."""
 
     height: float
     side: float
@@ -189,19 +191,32 @@ def open_slips(network: LineNetwork, seen: cKDTree, spacings_m: Sequence[float])
     """Draw the crossings inside slips as two straight lines that cross, and find the slip curves.
 
     The lines have no passes, `seen` holds the places of rail cells, and `spacings_m` are the distances between the axes
-    of a track's rails. The slips are what `add_curves` adds once the joins have been chosen: two with the same curves
-    for each slip, whose left rails cross a gauge from its right ones. Each is drawn before the next is sought, which it
-    may disturb.
+    of a track's rails. The slips are what `add_curves` adds once the joins have been chosen: two with the same curves,
+    of the left and of the right rails. Both are drawn before the next ones are sought, which they may disturb.
     """
     slips: list[Slip] = []
     parts = None
     for place in _candidates(network):
         parts = parts or _Parts.of(network)
-        for slip in _slips_at(parts, place, seen, spacings_m):
-            if all(np.hypot(*(slip.cross.place - one.cross.place)) > SAME_M for one in slips):
-                slips.append(slip)
-                network, parts = _as_crossing(network, slip), None
+        found = [
+            slip
+            for slip in _slips_at(parts, place, seen, spacings_m)
+            if all(np.hypot(*(slip.cross.place - one.cross.place)) > SAME_M for one in slips)
+        ]
+        drawn = _as_crossings(network, found)
+        if found and drawn is not None:
+            slips += found
+            network, parts = drawn, None
     return network, slips
+
+
+def _as_crossings(network: LineNetwork, slips: Sequence[Slip]) -> LineNetwork | None:
+    """Draw slips as two straight lines that cross each; None if the network does not show all four legs of each."""
+    for slip in slips:
+        network, legs = _as_crossing(network, slip)
+        if legs < 4:
+            return None
+    return network
 
 
 def _candidates(network: LineNetwork) -> np.ndarray:
@@ -281,7 +296,7 @@ def _slips_at(parts: _Parts, place: np.ndarray, seen: cKDTree, spacings_m: Seque
 def _curve_on(side: float, crosses: Sequence[_Cross], clear_m: float, seen: cKDTree) -> Curve | None:
     """Find the curve that touches the lines of two crossings on one side of each, 1 for the left, -1 for the right.
 
-    None if cells show no such curve, or too little of both rails together.
+    None if cells show no such curve, or too little of its rails.
     """
     stated = [
         cross.heights(side, seen.data[seen.query_ball_point(cross.place, clear_m)], clear_m / CLEAR_SHARE)
@@ -299,7 +314,8 @@ def _curve_on(side: float, crosses: Sequence[_Cross], clear_m: float, seen: cKDT
         return None
     parts = [np.unique(np.floor(x[np.abs(own - found) <= HALF_HEAD_M] / COVER_M)) for x, own in stated]
     covered = [min(len(part) * COVER_M / length, 1.0) for part in parts]
-    return Curve(found, side) if np.mean(covered) >= MIN_COVERED else None
+    is_seen = np.mean(covered) >= MIN_COVERED and min(covered) >= MIN_COVERED_OF_ONE
+    return Curve(found, side) if is_seen else None
 
 
 def _cross_near(parts: _Parts, place: np.ndarray, clear_m: float) -> _Cross | None:
@@ -320,8 +336,8 @@ def _continue(tips: np.ndarray, outward: np.ndarray) -> bool:
     return bool(bend <= MAX_BEND_DEG and miss <= MAX_MISS_M)
 
 
-def _as_crossing(network: LineNetwork, slip: Slip) -> LineNetwork:
-    """Remove what is inside a slip, and join its four legs as two straight lines that cross."""
+def _as_crossing(network: LineNetwork, slip: Slip) -> tuple[LineNetwork, int]:
+    """Remove what is inside a slip, and join its legs as two straight lines that cross; also count the legs."""
     middle = len(network.nodes)
     lines: list[np.ndarray] = []
     ends: list[tuple[int, int]] = []
@@ -345,7 +361,8 @@ def _as_crossing(network: LineNetwork, slip: Slip) -> LineNetwork:
             if len(piece) > 1:
                 lines.append(piece)
                 ends.append((pair[0], pair[1]))
-    return weld_pairs(LineNetwork(tuple(lines), np.array(nodes), np.array(ends)).tidy())
+    legs = int(np.isin(ends, [middle, middle + 1]).sum())
+    return weld_pairs(LineNetwork(tuple(lines), np.array(nodes), np.array(ends)).tidy()), legs
 
 
 def add_curves(network: LineNetwork, slips: Sequence[Slip]) -> LineNetwork:

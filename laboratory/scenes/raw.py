@@ -187,7 +187,7 @@ def crests_of(rails: tuple[np.ndarray, ...], line: Curve, surface: Surface, blur
 
 
 def _is_paved(rail: np.ndarray, line: Curve, surface: Surface) -> np.ndarray:
-    """Return where a surface is as high on either side of a rail, (k, 3), as its top, (k,) bool."""
+    """Return where a surface is less than `PAVED_M` below a rail, (k, 3), on at least one of its sides, (k,) bool."""
     _, chainage, left = along_and_left(line, rail[:, :2])
     beside = np.max([surface.at(chainage, left + side) for side in (-BESIDE_M, BESIDE_M)], axis=0)
     return rail[:, 2] - beside < PAVED_M

@@ -19,7 +19,7 @@ MIXED = 15
 """Kind of a point between two surfaces."""
 
 SECOND_ECHO = 0.3
-"""Least share of the footprint that makes a second echo."""
+"""Least share of the power that makes a second echo."""
 
 SUBRAYS = tuple(np.arange(-6, 7) / 4)
 _POWER = np.exp(-2 * np.square(SUBRAYS))
@@ -45,7 +45,7 @@ class RawScanner:
     half_range_m : float
         Distance at which half the rays come back.
     footprint_m : float
-        Width of the beam where it hits.
+        Width of the beam where it hits, to 1/e² of its power.
     wide : bool
         Whether the footprint is as wide as a railhead, so that ranges within it are averaged.
     view_rad : tuple of float

@@ -150,8 +150,8 @@ def around_holes(holes_m, neck_m=0.3):
 
 
 @pytest.mark.parametrize("number", [20, 25, 30])
-@pytest.mark.parametrize(("spacings_m", "crosses"), [((SPACING_M,), True), ((), False)])
-def test_rails_that_cross_flatly_stay_beside_their_partners(number, spacings_m, crosses):
+@pytest.mark.parametrize("spacings_m", [(SPACING_M,), (1.07, SPACING_M)])
+def test_rails_that_cross_at_a_small_angle_stay_beside_their_partners(number, spacings_m):
     """Wing rails that draw the legs apart turn their directions by as much as the angle at which the rails cross."""
     slopes = 0.5 / number, -0.5 / number
     ways = [(side, slope) for side in (-1, 1) for slope in slopes]
@@ -162,7 +162,7 @@ def test_rails_that_cross_flatly_stay_beside_their_partners(number, spacings_m, 
     found = resolved(drawn, spacings_m, cKDTree(np.concatenate([*map(even_points, drawn.lines), *partners])))
     whole = [line for line in found.lines if np.ptp(line[:, 0]) > 45]
     assert len(whole) == 2
-    assert all((line[0, 1] * line[-1, 1] < 0) == crosses for line in whole)
+    assert all(line[0, 1] * line[-1, 1] < 0 for line in whole)
 
 
 @pytest.mark.parametrize("holes_m", [(0.5,), (1.5,), (0.6, 1.1)])

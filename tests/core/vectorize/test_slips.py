@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from rail_extract.core.lines.ends import even_points
 from rail_extract.core.lines.network import LineNetwork
+from rail_extract.core.polyline import Polyline
 from rail_extract.core.vectorize.courses import follow_courses
 from rail_extract.core.vectorize.slips import add_curves, open_slips
 from scipy.spatial import cKDTree
@@ -24,7 +24,8 @@ def lines_beside_a_slip(number=9.0, radius_m=190.0, spacing_m=SPACING_M):
 
 def cells_of(lines):
     """Places of the cells of heads along lines."""
-    heads = [line + [0.0, aside] for line in map(even_points, lines) for aside in np.linspace(-1, 1, 9) * HALF_HEAD_M]
+    dense = [Polyline(line).resampled(CELL_M / 2).xy for line in lines]
+    heads = [line + [0.0, aside] for line in dense for aside in np.linspace(-1, 1, 9) * HALF_HEAD_M]
     return cKDTree(CELL_M * np.unique(np.round(np.concatenate(heads) / CELL_M), axis=0))
 
 
@@ -109,3 +110,21 @@ def test_without_rails_a_gauge_beside_a_crossing_it_is_no_slip():
     network, slips = opened(lines_beside_a_slip()[:2])
     assert not slips
     assert len(network.lines) == 2
+
+
+@pytest.mark.parametrize(
+    ("number", "radius_m", "spacing_m"), [(6.6, 117.0, 0.65), (7.5, 150.0, 0.65), (6.0, 100.0, 0.8)]
+)
+def test_the_curve_of_the_other_crossing_is_none_of_this_one(number, radius_m, spacing_m):
+    """On narrow gauges, it reaches the other side of the crossing beside it."""
+    _, slips = opened(lines_beside_a_slip(number, radius_m, spacing_m), spacing_m=spacing_m)
+    assert [len(slip.curves) for slip in slips] == [1, 1]
+
+
+def test_a_curve_beside_one_of_two_crossings_is_no_slip():
+    lines = lines_beside_a_slip()
+    plain = [
+        np.column_stack([line[:, 0], SPACING_M + side * line[:, 0] / 18]) for line, side in zip(lines[2:], (1, -1))
+    ]
+    _, slips = opened(lines[:2] + plain)
+    assert not slips
