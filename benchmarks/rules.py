@@ -63,7 +63,7 @@ SWITCHES = (
     _rule("vectorize.part_branches", first),
     _rule("vectorize.choose_routes", first),
     _rule("vectorize._settle_ends", first),
-    _rule("vectorize.courses.AT_GAUGE_M", -1.0),
+    _rule("vectorize.cells.AT_GAUGE_M", -1.0),
     _rule("heads.top._raised_stations", lambda top: np.zeros(len(top.points.stations), dtype=bool)),
     _rule("lines.ends._astray", lambda *_: 0),
     _rule("squares.steps.drawn", lambda *_: np.empty((0, 2))),

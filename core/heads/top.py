@@ -136,6 +136,11 @@ class Top:
     slope: np.ndarray
     crown_m: Union[float, np.ndarray] = 0.0
 
+    @property
+    def level(self) -> np.ndarray:
+        """Heights of the points without the slope across, (n,) metres."""
+        return self.points.z - self.slope * self.points.across
+
     def height_error(self, support: Support) -> np.ndarray:
         """Return the standard error of the height at the stations of a support, (s,) metres.
 
@@ -153,7 +158,7 @@ def by_outline(top: Top, outline: Middles) -> Top:
     """
     chosen = top.points.within(AXIS_SHARE)
     points, stations = top.points[chosen], top.points.stations
-    flat = points.z - top.slope[chosen] * points.across
+    flat = top.level[chosen]
     count = points.per_station()
     mean_m = points.per_station(flat) / np.maximum(count, 1)
     outlined = np.isfinite(outline.top) & (outline.top_information > 0)
@@ -210,15 +215,14 @@ def by_lone_ridge(top: Top, smoothing_m: float | None, prior: Prior) -> Top:
     chosen &= points.within(AXIS_SHARE)
     if chosen.sum() < MIN_POINTS:
         return top
-    flat = points.z[chosen] - top.slope[chosen] * points.across[chosen]
-    return replace(top, course=smoothed(points.t[chosen], flat, smoothing_m, prior))
+    return replace(top, course=smoothed(points.t[chosen], top.level[chosen], smoothing_m, prior))
 
 
 def _raised_stations(top: Top) -> np.ndarray:
     """Return at which stations a ridge is higher than on both sides, (s,) bool: it stands in a pavement there."""
     count = top.points.per_station()
     known = np.flatnonzero(count)
-    heights = top.points.per_station(top.points.z - top.slope * top.points.across)[known] / count[known]
+    heights = top.points.per_station(top.level)[known] / count[known]
     raised = np.zeros(len(count), dtype=bool)
     steady = uniform_filter1d(heights, RAISED_STATIONS)
     raised[known] = are_sunk(top.points.stations[known], -steady, RAISED_ROUGH_M)

@@ -14,6 +14,7 @@ from ..parameters import Parameters
 from ..progress import SILENT, Progress
 from ..raster import RailRaster
 from .branches import attach_branches, choose_routes, part_branches
+from .cells import RailCells
 from .courses import follow_courses
 from .junctions import clean_junctions, cut_bends, run_through, weld_pairs
 from .skeleton import chamfer_distance, close, parity_fix, pixel_set, prune, trace, veinerize
@@ -57,12 +58,12 @@ def vectorize(
     traced = trace(closed, pixels, edges, tips)
     progress.set_fraction(0.6)
     progress.check()
-    seen = cKDTree(closed.to_local(pixels.cells / 2))
-    network, slips = open_slips(clean_junctions(traced, head_width_m), seen, spacings_m)
+    rail_cells = RailCells(cKDTree(closed.to_local(pixels.cells / 2)), spacings_m)
+    network, slips = open_slips(clean_junctions(traced, head_width_m), rail_cells)
     network = cut_bends(network, progress.span(0.6, 0.7))
-    network = follow_courses(network, seen, spacings_m, max_gap_m, gap_angle_deg, progress.span(0.7, 0.9))
+    network = follow_courses(network, rail_cells, max_gap_m, gap_angle_deg, progress.span(0.7, 0.9))
     network = run_through(part_branches(add_curves(network, slips)))
-    network = attach_branches(network, seen, max_gap_m, progress.span(0.9, 1.0))
+    network = attach_branches(network, rail_cells.tree, max_gap_m, progress.span(0.9, 1.0))
     return _settle_ends(choose_routes(_drop_short(network, min_length_m)))
 
 

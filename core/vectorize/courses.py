@@ -29,6 +29,7 @@ from ..lines.ends import (
 )
 from ..lines.network import LineNetwork
 from ..progress import SILENT, Progress
+from .cells import STAIRS_LENGTH_M, STEADY_M, RailCells
 from .junctions import DIRECTION_M, KINK_DEG, branchings, points_of, unsteadiness, weld_pairs
 
 MAX_MERGED_M = 14.0
@@ -51,16 +52,6 @@ MIN_PIECE_M = 0.3
 UNSEEN_M = 0.12
 """A place this far from all cells shows neither its rail, nor one that is merged with it, nor a check rail that hides
 it, whose head begins 0.10 m from the axis of the rail. A link closer than this may be what shows the rail."""
-
-STEADY_M = 8.0
-"""Length of line on either side of a join that is to be of one curvature."""
-
-STAIRS_LENGTH_M = 1.0
-"""Shorter parts of a line show the direction of stairs."""
-
-AT_GAUGE_M = 0.045
-"""Largest distance from a place at gauge to the nearest cell of a partner: half the diagonal of a cell, and the stairs
-of the line."""
 
 STRAY_M = 0.012
 """Standard error of a steady line: a rail is anywhere in cells of 0.04 m, which is 0.04 m / √12 rms."""
@@ -89,12 +80,7 @@ from the axis of its rail."""
 
 
 def follow_courses(
-    network: LineNetwork,
-    seen: cKDTree,
-    spacings_m: Sequence[float],
-    max_gap_m: float,
-    gap_angle_deg: float,
-    progress: Progress = SILENT,
+    network: LineNetwork, cells: RailCells, max_gap_m: float, gap_angle_deg: float, progress: Progress = SILENT
 ) -> LineNetwork:
     """Join the ends of lines that continue each other, through junctions, past bends and across gaps.
 
@@ -103,12 +89,12 @@ def follow_courses(
     rounds, because a joined line shows better where it leads. Where a line continues in one of two others in a node, it
     is a branching, which stays, in one node; see `part_branches`.
 
-    At most `max_gap_m` of a join is away from all cells, `seen`, and both ends point at each other within
-    `gap_angle_deg`. `spacings_m` are the distances between the axes of a track's rails: a line whose partner is on its
-    left does not continue one whose partner is on its right. The network has no passes.
+    A line whose partner, the other rail of its track, is on its left does not continue one whose partner is on its
+    right. At most `max_gap_m` of a join is away from all cells, and both ends point at each other within
+    `gap_angle_deg`. The network has no passes.
     """
     while True:
-        network, joined = _joined(network, _Joins(network, seen, spacings_m, max_gap_m, gap_angle_deg, progress))
+        network, joined = _joined(network, _Joins(network, cells, max_gap_m, gap_angle_deg, progress))
         if not joined:
             return weld_pairs(network, KINK_DEG)
 
@@ -121,15 +107,9 @@ class _Joins:
     """
 
     def __init__(
-        self,
-        network: LineNetwork,
-        seen: cKDTree,
-        spacings_m: Sequence[float],
-        max_gap_m: float,
-        gap_angle_deg: float,
-        progress: Progress = SILENT,
+        self, network: LineNetwork, cells: RailCells, max_gap_m: float, gap_angle_deg: float, progress: Progress
     ) -> None:
-        self.network, self.seen, self.spacings_m = network, seen, spacings_m
+        self.network, self.cells = network, cells
         self.max_gap_m, self.slope = max_gap_m, float(np.tan(np.radians(gap_angle_deg)))
         self.lengths = network.lengths()
         degrees = network.degrees()[network.ends].min(axis=1, initial=9)
@@ -143,6 +123,7 @@ class _Joins:
             found = self._cheapest(one, other)
             if found is not None:
                 self.costs[one, other], self.bridges[one, other] = found
+        self.links_along = {ends: self._links_along(ends) for ends in self.bridges}
 
     def _near(self) -> list[tuple[int, int]]:
         """List the pairs of ends that a join could connect; those of one long piece would close a loop."""
@@ -191,7 +172,7 @@ class _Joins:
     ) -> float:
         """Return what speaks against a curve from one way to another, given from their ends inward, with their tips."""
         (one, other), ((tip, outward), (other_tip, other_outward)) = ways, tips
-        gap_m = unseen_m(curve.points, self.seen)
+        gap_m = unseen_m(curve.points, self.cells.tree)
         if gap_m > self.max_gap_m:
             return np.inf
         bends = np.array([-_curvature(one), _curvature(other)])
@@ -203,41 +184,25 @@ class _Joins:
         turn = float(np.sum(turns**2)) / np.radians(TURN_DEG) ** 2
         stray = unsteadiness(one, other, STEADY_M) ** 2 / (STRAY_M**2 + own_m**2)
         cost = turn + stray + UNSEEN * gap_m / max(self.max_gap_m, STEP_M)
-        return cost + FREE * self._changes_sides(one, other) if cost < 2 * FREE else np.inf
+        return cost + FREE * self.cells.change_of_sides(one, other) if cost < 2 * FREE else np.inf
 
-    def _changes_sides(self, one: np.ndarray, other: np.ndarray) -> float:
-        """Return how surely, 0 to 1, two ways, given from their ends inward, have their partners on different sides."""
-        sides, other_sides = self._partners(one)[::-1], self._partners(other)
-        return min(max(sides), max(other_sides)) - max(min(pair) for pair in zip(sides, other_sides))
+    def _links_along(self, ends: tuple[int, int]) -> np.ndarray:
+        """Return the number of the link at each place of the bridge between two ends that runs along another one."""
+        points = self.bridges[ends].points
+        if not len(points):
+            return np.empty(0, dtype=int)
+        near_m, nearest = self.drawn.query(points)
+        number = self.number[nearest]
+        return number[(near_m < UNSEEN_M) & self.is_link[number] & ~np.isin(number, [end // 2 for end in ends])]
 
-    def _partners(self, way: np.ndarray) -> tuple[float, float]:
-        """Return the shares of a way, up to `STEADY_M`, that have the other rail of a track on its left and right."""
-        points = even_points(way, STEADY_M)
-        if len(points) * STEP_M < STAIRS_LENGTH_M or not self.spacings_m:
-            return 0.0, 0.0
-        along = np.arange(len(points))
-        powers = np.vander(along, 3)
-        arc = np.linalg.lstsq(powers, points, rcond=None)[0]  # the stairs would turn the direction to the partner
-        ahead = 2 * np.outer(along, arc[0]) + arc[1]
-        left = np.column_stack([-ahead[:, 1], ahead[:, 0]]) / np.hypot(*ahead.T)[:, None]
-        beside = np.multiply.outer([1.0, -1.0], np.multiply.outer(self.spacings_m, left))
-        at_gauge = self.seen.query(powers @ arc + beside)[0] < AT_GAUGE_M
-        left_share, right_share = at_gauge.mean(axis=2).max(axis=1).tolist()
-        return left_share, right_share
-
-    def _saved(self, ends: tuple[int, int], used: Collection[int] = ()) -> float:
+    def _saved(self, ends: tuple[int, int], used: Collection[int]) -> float:
         """Return what the bridge between two ends saves by running along links, which it explains.
 
         A link that is left out costs something because nothing explains it. Two rails that cross do, half of it each.
         Those that are `used` are not left out.
         """
-        points = self.bridges[ends].points
-        if not len(points):
-            return 0.0
-        near_m, nearest = self.drawn.query(points)
-        number = self.number[nearest]
-        own = np.isin(number, [ends[0] // 2, ends[1] // 2, *used])
-        return 0.5 * LINK_PER_M * STEP_M * np.count_nonzero((near_m < UNSEEN_M) & self.is_link[number] & ~own)
+        left_out = ~np.isin(self.links_along[ends], list(used))
+        return 0.5 * LINK_PER_M * STEP_M * np.count_nonzero(left_out)
 
     def chosen(self) -> list[tuple[int, int]]:
         """List the joins that together cost about least.
@@ -245,11 +210,14 @@ class _Joins:
         Which links are left out is only known once joins have been chosen, so they are chosen twice: what the joins of
         the first choice use saves others nothing in the second.
         """
-        pairs = best_pairs(self._gains())
-        used = [number for number in np.flatnonzero(self.is_link).tolist() if (2 * number, 2 * number + 1) not in pairs]
+        first = self._cheapest_joins(used=())
+        return self._cheapest_joins(used={end // 2 for ends in first for end in ends})
+
+    def _cheapest_joins(self, used: Collection[int]) -> list[tuple[int, int]]:
+        """List the joins that cost about least if links are `used`."""
         return sorted(ends for ends in best_pairs(self._gains(used)) if ends in self.costs)
 
-    def _gains(self, used: Collection[int] = ()) -> dict[tuple[int, int], float]:
+    def _gains(self, used: Collection[int]) -> dict[tuple[int, int], float]:
         """Return what each join gains, and each piece that no join uses; see `_saved` for the links that are `used`."""
         free = np.where(self.is_link, HALF_USED, FREE)
         free_ends = (self.network.degrees()[self.network.ends] == 1).sum(axis=1)

@@ -18,6 +18,7 @@ from scipy.spatial import cKDTree
 from ..lines.ends import STEP_M, even_points, tip_and_direction
 from ..lines.network import LineNetwork
 from ..polyline import runs
+from .cells import RailCells
 from .junctions import DIRECTION_M, points_of, weld_pairs
 
 CLEAR_M = (8.0, 11.0, 14.0, 17.0, 20.0)
@@ -187,12 +188,11 @@ class Slip:
         return None if turns or off_m > STRAY_M else int(x * y > 0)
 
 
-def open_slips(network: LineNetwork, seen: cKDTree, spacings_m: Sequence[float]) -> tuple[LineNetwork, list[Slip]]:
+def open_slips(network: LineNetwork, cells: RailCells) -> tuple[LineNetwork, list[Slip]]:
     """Draw the crossings inside slips as two straight lines that cross, and find the slip curves.
 
-    The lines have no passes, `seen` holds the places of rail cells, and `spacings_m` are the distances between the axes
-    of a track's rails. The slips are what `add_curves` adds once the joins have been chosen: two with the same curves,
-    of the left and of the right rails. Both are drawn before the next ones are sought, which they may disturb.
+    The lines have no passes. The slips are what `add_curves` adds once the joins have been chosen: two with the same
+    curves, of the left and of the right rails. Both are drawn before the next ones are sought, which they may disturb.
     """
     slips: list[Slip] = []
     parts = None
@@ -200,11 +200,11 @@ def open_slips(network: LineNetwork, seen: cKDTree, spacings_m: Sequence[float])
         parts = parts or _Parts.of(network)
         found = [
             slip
-            for slip in _slips_at(parts, place, seen, spacings_m)
+            for slip in _slips_at(parts, place, cells)
             if all(np.hypot(*(slip.cross.place - one.cross.place)) > SAME_M for one in slips)
         ]
-        drawn = _as_crossings(network, found)
-        if found and drawn is not None:
+        drawn = _as_crossings(network, found) if found else None
+        if drawn is not None:
             slips += found
             network, parts = drawn, None
     return network, slips
@@ -276,17 +276,17 @@ class _Parts:
         return tips, outward
 
 
-def _slips_at(parts: _Parts, place: np.ndarray, seen: cKDTree, spacings_m: Sequence[float]) -> list[Slip]:
+def _slips_at(parts: _Parts, place: np.ndarray, cells: RailCells) -> list[Slip]:
     """Find the slip around a place, as those of its left and of its right rails; empty if there is none."""
     for clear_m in CLEAR_M:
         rough = _cross_near(parts, place, clear_m)
         cross = None if rough is None else _cross_near(parts, rough.place, clear_m)
         if cross is None:
             continue
-        for other in (cross.beside(side * spacing_m) for spacing_m in spacings_m for side in (1.0, -1.0)):
-            if np.mean(seen.query(other.legs(clear_m))[0] < HALF_HEAD_M) < MIN_LEGS:
+        for other in (cross.beside(side * spacing_m) for spacing_m in cells.spacings_m for side in (1.0, -1.0)):
+            if np.mean(cells.tree.query(other.legs(clear_m))[0] < HALF_HEAD_M) < MIN_LEGS:
                 continue
-            found = (_curve_on(side, (cross, other), clear_m, seen) for side in (1.0, -1.0))
+            found = (_curve_on(side, (cross, other), clear_m, cells.tree) for side in (1.0, -1.0))
             curves = tuple(curve for curve in found if curve is not None)
             if curves:
                 return [Slip(one, clear_m, curves) for one in (cross, other)]

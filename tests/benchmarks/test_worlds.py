@@ -16,8 +16,8 @@ FIXED = [(RAW, seed) for seed in (1, 6, 12, 20)] + [(CLASSIFIED, seed) for seed 
 
 
 SWITCHES = [(CLASSIFIED, seed) for seed in (10958, 11157, 11383)]
-"""Worlds that fail if lines do not keep their partners at a flat crossing, if the rails of a slip are found one by one,
-and if a link counts as left out that another join uses."""
+"""Worlds that fail if lines do not keep their partners where rails cross at a small angle, if the rails of a slip are
+found one by one, and if a link counts as left out that another join uses."""
 
 
 @pytest.mark.parametrize(("cloud", "seed"), FIXED + SWITCHES)

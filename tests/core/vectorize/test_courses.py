@@ -10,6 +10,7 @@ from rail_extract.core.lines.ends import even_points
 from rail_extract.core.lines.network import LineNetwork
 from rail_extract.core.parameters import Parameters
 from rail_extract.core.polyline import Polyline, project
+from rail_extract.core.vectorize.cells import RailCells
 from rail_extract.core.vectorize.courses import best_pairs, follow_courses
 from rail_extract.core.vectorize.junctions import branchings, cut_bends
 from scipy.spatial import cKDTree
@@ -41,7 +42,7 @@ def network(legs, links, nodes):
 def resolved(drawn, spacings_m=(), seen=None):
     """Follow the courses of lines that cells show, with the longest gap and the angle of the defaults."""
     seen = seen or cKDTree(np.concatenate(drawn.lines))
-    return follow_courses(cut_bends(drawn), seen, spacings_m, Parameters.max_gap_m, Parameters.gap_angle_deg)
+    return follow_courses(cut_bends(drawn), RailCells(seen, spacings_m), Parameters.max_gap_m, Parameters.gap_angle_deg)
 
 
 def check_that_two_rails_cross(found):

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from rail_extract.core.lines.network import LineNetwork
 from rail_extract.core.polyline import Polyline
+from rail_extract.core.vectorize.cells import RailCells
 from rail_extract.core.vectorize.courses import follow_courses
 from rail_extract.core.vectorize.slips import add_curves, open_slips
 from scipy.spatial import cKDTree
@@ -32,14 +33,16 @@ def cells_of(lines):
 def opened(lines, seen=None, spacing_m=SPACING_M):
     ends = np.arange(2 * len(lines)).reshape(-1, 2)
     nodes = np.concatenate([line[[0, -1]] for line in lines])
-    return open_slips(LineNetwork(tuple(lines), nodes, ends), seen or cells_of(lines), [spacing_m])
+    return open_slips(LineNetwork(tuple(lines), nodes, ends), RailCells(seen or cells_of(lines), [spacing_m]))
 
 
 @pytest.mark.parametrize(("number", "radius_m"), [(9.0, 190.0), (6.6, 117.0)])
 def test_a_slip_is_found_where_no_lines_meet(number, radius_m):
     network, slips = opened(lines_beside_a_slip(number, radius_m))
     np.testing.assert_allclose(sorted(slip.cross.place[1] for slip in slips), [0.0, SPACING_M], atol=0.02)
-    network = add_curves(follow_courses(network, cKDTree(np.concatenate(network.lines)), [SPACING_M], 5.0, 10.0), slips)
+    network = add_curves(
+        follow_courses(network, RailCells(cKDTree(np.concatenate(network.lines)), [SPACING_M]), 5.0, 10.0), slips
+    )
     assert len(network.lines) == 6
     straight = [line for line in network.lines if abs(line[-1, 1] - line[0, 1]) > 2.0]
     assert len(straight) == 4
@@ -69,7 +72,7 @@ def test_a_slip_curve_passes_the_crossing_as_its_radius_says(number, radius_m):
 def test_legs_of_the_other_crossing_are_not_taken_for_those_of_a_slip(number, spacing_m):
     lines = lines_beside_a_slip(number, 100.0, spacing_m)
     network, slips = opened(lines, spacing_m=spacing_m)
-    drawn = add_curves(follow_courses(network, cells_of(lines), [spacing_m], 5.0, 10.0), slips).lines
+    drawn = add_curves(follow_courses(network, RailCells(cells_of(lines), [spacing_m]), 5.0, 10.0), slips).lines
     assert sorted(round(np.ptp(line[:, 0])) for line in drawn if np.ptp(line[:, 0]) > 20) == [2 * LENGTH_M] * 4
 
 
