@@ -33,6 +33,10 @@ LEAST_CELLS = 3
 """Cells with points that a line must have, and twice as many on each side: profiles of a scanner are up to 0.2 m
 apart."""
 
+SHADOW = 3
+"""How many times as many cells are seen on one side of a head as in the shadow that it casts on the other. A head of
+5 cm hides 0.8 m of the bed from a scanner that stands 1.7 m high 30 m away."""
+
 SURFACE_M = (np.inf, 0.05, 0.03)
 """Distances from the surface within which cells count towards it, round by round: the scatter of ballast, and short of
 a step at the ends of sleepers."""
@@ -49,6 +53,10 @@ CERTAIN = 4.5
 CREST_CELLS = 2
 """Cells to either side than which a crest is not lower: a head is as wide."""
 
+HIGHEST_M = 0.10
+"""Height above its surroundings below which points may be of a head that stands just out of its bed: those of wheels
+and vehicles on it would lift its cross-section."""
+
 RISE_M = 0.006
 """Least rise of a line: pavements wear to as much, and heads of less are in a pavement themselves."""
 
@@ -58,8 +66,9 @@ class Low:
     """What lines through cells show, (rows, columns) arrays.
 
     `rise` is how far the line is above the higher one of its sides, metres, in the direction in which this is most
-    certain, and `base` the height of this side above the bed; NaN where no line is seen. `crest` says which cells may
-    be on a head: the line is certainly above its sides, and more so than those beside it.
+    certain, and `base` the height of this side above the bed; NaN where no line is seen. A side in
+    shadow is lower. `crest` says which cells may be on a head: the line is certainly above its sides, and more so than
+    those beside it.
     """
 
     rise: np.ndarray
@@ -81,7 +90,8 @@ def on_low(shown: Shown, settings: Settings) -> Standing:
     kept = kept.of(with_partner(kept.pairs, kept.paired))
     if len(kept.cell):
         piece = pieces_of(len(kept.cell), kept.pairs)
-        width_m = Ridges.measure(shown.xy, shown.height, kept.lines, piece).width_m
+        of_heads = shown.height < HIGHEST_M
+        width_m = Ridges.measure(shown.xy[of_heads], shown.height[of_heads], kept.lines, piece).width_m
         too_wide = width_m >= settings.head_width_m + tolerances.wider_m  # where one side is hidden, this is not known
         kept = fitting(kept, piece, ~too_wide, settings, tolerances)
     chosen = label(shown.tops, whole_heads(shown.tops, kept.cell, tolerances), shown.cell, shown.height, tolerances)
@@ -94,7 +104,8 @@ def find_low(grid: Grid, level: np.ndarray) -> Low:
     surface = _surface(level, grid)
     level = np.clip(level - surface, -CLIPPED_M, CLIPPED_M)
     certain, rise, base, direction = _most_certain(level, grid.cell_m)
-    crest = np.isfinite(level) & (certain >= CERTAIN) & (np.nan_to_num(rise) >= RISE_M)
+    certain = np.where(np.isfinite(level), certain, 0.0)
+    crest = (certain >= CERTAIN) & (np.nan_to_num(rise) >= RISE_M)
     return Low(rise, base + surface, crest & _are_crests(certain, direction))
 
 
@@ -126,12 +137,21 @@ def _most_certain(level: np.ndarray, cell_m: float) -> tuple[np.ndarray, np.ndar
         down, right = _step(number)
         line = Sample(*_along(images, down, right))
         sides = [Sample(*_beside(line, side * right / cell_m, -side * down / cell_m)) for side in (1, -1)]
-        least = np.min([line.certainly_above(side) for side in sides], axis=0)
+        hidden = [SHADOW * side.count < other.count for side, other in (sides, sides[::-1])]
+        hidden = [one & _inside(one.shape, side, down / cell_m, right / cell_m) for one, side in zip(hidden, (1, -1))]
+        above = [np.where(one, np.inf, line.certainly_above(side)) for one, side in zip(hidden, sides)]
+        least = np.min(above, axis=0)
         better = least > certain
         certain[better], direction[better] = least[better], number
-        base[better] = np.max([side.mean for side in sides], axis=0)[better]
+        base[better] = np.max([np.where(one, -np.inf, side.mean) for one, side in zip(hidden, sides)], axis=0)[better]
         rise[better] = line.mean[better] - base[better]
     return certain, rise, base, direction
+
+
+def _inside(shape: tuple[int, ...], side: int, down: float, right: float) -> np.ndarray:
+    """Return beside which cells the places on a side are in the raster, bool: beyond its border, nothing is hidden."""
+    far_m = side * BESIDE_M[-1]
+    return _moved(np.ones(shape, dtype=bool), far_m * right, -far_m * down)
 
 
 def _step(number: int) -> tuple[float, float]:

@@ -52,6 +52,14 @@ def test_a_slope_hides_no_head():
     assert low.crest.sum() > 0.4 * SIDE
 
 
+def test_a_head_is_seen_beside_its_own_shadow():
+    left = off_m(20.0)
+    level = np.where(np.abs(left) < 0.036, 0.04, bed())
+    low = found(np.where(np.isnan(bed()) | ((left > 0.036) & (left < 0.6)), np.nan, level))
+    assert (np.abs(left[low.crest]) < 0.06).mean() > 0.95
+    assert low.crest.sum() > 0.4 * SIDE
+
+
 def test_what_is_not_seen_has_no_crest():
     low = found(np.full((SIDE, SIDE), np.nan))
     assert not low.crest.any()
