@@ -66,9 +66,9 @@ class Low:
     """What lines through cells show, (rows, columns) arrays.
 
     `rise` is how far the line is above the higher one of its sides, metres, in the direction in which this is most
-    certain, and `base` the height of this side above the bed; NaN where no line is seen. A side in
-    shadow is lower. `crest` says which cells may be on a head: the line is certainly above its sides, and more so than
-    those beside it.
+    certain, and `base` the height of this side above the bed; NaN where no line is seen. A
+    side in shadow is lower. `crest` says which cells may be on a head: the line is certainly above its sides, and more
+    so than those beside it.
     """
 
     rise: np.ndarray
@@ -136,22 +136,25 @@ def _most_certain(level: np.ndarray, cell_m: float) -> tuple[np.ndarray, np.ndar
     for number in range(DIRECTIONS):
         down, right = _step(number)
         line = Sample(*_along(images, down, right))
-        sides = [Sample(*_beside(line, side * right / cell_m, -side * down / cell_m)) for side in (1, -1)]
-        hidden = [SHADOW * side.count < other.count for side, other in (sides, sides[::-1])]
-        hidden = [one & _inside(one.shape, side, down / cell_m, right / cell_m) for one, side in zip(hidden, (1, -1))]
-        above = [np.where(one, np.inf, line.certainly_above(side)) for one, side in zip(hidden, sides)]
+        ways = [(side * right / cell_m, -side * down / cell_m) for side in (1, -1)]
+        sides = [Sample(*_beside(line, *way)) for way in ways]
+        hidden = [_hidden(side, other, way) for side, other, way in zip(sides, sides[::-1], ways)]
+        above = [np.where(dark, np.inf, line.certainly_above(side)) for dark, side in zip(hidden, sides)]
         least = np.min(above, axis=0)
         better = least > certain
         certain[better], direction[better] = least[better], number
-        base[better] = np.max([np.where(one, -np.inf, side.mean) for one, side in zip(hidden, sides)], axis=0)[better]
+        base[better] = np.max([np.where(dark, -np.inf, side.mean) for dark, side in zip(hidden, sides)], axis=0)[better]
         rise[better] = line.mean[better] - base[better]
     return certain, rise, base, direction
 
 
-def _inside(shape: tuple[int, ...], side: int, down: float, right: float) -> np.ndarray:
-    """Return beside which cells the places on a side are in the raster, bool: beyond its border, nothing is hidden."""
-    far_m = side * BESIDE_M[-1]
-    return _moved(np.ones(shape, dtype=bool), far_m * right, -far_m * down)
+def _hidden(side: Sample, other: Sample, way: tuple[float, float]) -> np.ndarray:
+    """Return where a side is in shadow, by the other one, (rows, columns) bool: not beyond the border of the raster.
+
+    A metre to this side is as many rows down and columns to the right as `way` says.
+    """
+    inside = _moved(np.ones(side.count.shape, dtype=bool), BESIDE_M[-1] * way[0], BESIDE_M[-1] * way[1])
+    return inside & (SHADOW * side.count < other.count)
 
 
 def _step(number: int) -> tuple[float, float]:
