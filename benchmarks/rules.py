@@ -61,7 +61,6 @@ SWITCHES = (
     _rule("vectorize.courses.CUTS_M", (0.0,)),
     _rule("vectorize.attach_branches", first),
     _rule("vectorize.part_branches", first),
-    _rule("vectorize.choose_routes", first),
     _rule("vectorize._settle_ends", first),
     _rule("vectorize.cells.AT_GAUGE_M", -1.0),
     _rule("heads.top._raised_stations", lambda top: np.zeros(len(top.points.stations), dtype=bool)),

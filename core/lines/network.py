@@ -94,22 +94,6 @@ class LineNetwork:
         _, line, vertex = self.passes.T
         return (line == number) & (vertex >= first) & (vertex < last)
 
-    def parted(self) -> tuple[LineNetwork, dict[int, int]]:
-        """Cut all lines at the nodes that they pass; also return which ends belong together, for `weld`."""
-        lines: list[np.ndarray] = []
-        ends: list[list[int]] = []
-        partner: dict[int, int] = {}
-        for number, (line, own) in enumerate(zip(self.lines, self.ends.tolist())):
-            passes = self.passes[self.passes[:, 1] == number]
-            passes = passes[np.argsort(passes[:, 2], kind="stable")]
-            vertices, nodes = [0, *passes[:, 2].tolist(), len(line) - 1], [own[0], *passes[:, 0].tolist(), own[1]]
-            for piece in range(len(nodes) - 1):
-                if piece:
-                    partner[2 * len(lines)], partner[2 * len(lines) - 1] = 2 * len(lines) - 1, 2 * len(lines)
-                lines.append(line[vertices[piece] : vertices[piece + 1] + 1])
-                ends.append(nodes[piece : piece + 2])
-        return LineNetwork(tuple(lines), self.nodes, np.array(ends, dtype=np.int64).reshape(-1, 2)), partner
-
     def weld(self, partner: Mapping[int, int], bridges: Mapping[int, np.ndarray] | None = None) -> LineNetwork:
         """Join lines that continue each other into one.
 

@@ -13,7 +13,7 @@ from ..lines.network import LineNetwork
 from ..parameters import Parameters
 from ..progress import SILENT, Progress
 from ..raster import RailRaster
-from .branches import attach_branches, choose_routes, part_branches
+from .branches import attach_branches, part_branches
 from .cells import RailCells
 from .courses import follow_courses
 from .junctions import clean_junctions, cut_bends, run_through, weld_pairs
@@ -64,7 +64,7 @@ def vectorize(
     network = follow_courses(network, rail_cells, max_gap_m, gap_angle_deg, progress.span(0.7, 0.9))
     network = run_through(part_branches(add_curves(network, slips)))
     network = attach_branches(network, rail_cells.tree, max_gap_m, progress.span(0.9, 1.0))
-    return _settle_ends(choose_routes(_drop_short(network, min_length_m)))
+    return _settle_ends(_drop_short(network, min_length_m))
 
 
 def _drop_short(network: LineNetwork, min_length_m: float) -> LineNetwork:

@@ -236,15 +236,3 @@ def _is_straight(way: np.ndarray, apart: np.ndarray, share: float = STRAIGHTER) 
     straight, arc = (PartingLaw.fitted(way, apart, law) for law in (STRAIGHT, ARC))
     of_straight, of_arc = (np.std(law(way) - apart) for law in (straight, arc))
     return bool(straight.slope > np.tan(np.radians(MIN_ANGLE_DEG)) and of_straight < share * of_arc)
-
-
-def choose_routes(network: LineNetwork) -> LineNetwork:
-    """Let the rail whose curvature changes least pass through each node in which one rail leaves another."""
-    pieces, partner = network.parted()
-    for _, stem, legs in branchings(pieces):
-        scores = [unsteadiness(pieces.from_end(stem), pieces.from_end(leg), ROUTE_M) for leg in legs]
-        steady = legs[scores.index(min(scores))]
-        for end in (stem, *legs):
-            partner.pop(end, None)
-        partner[stem], partner[steady] = steady, stem
-    return pieces.weld(partner)

