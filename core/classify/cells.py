@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from .bed import COARSE_M, Bed, Coarse
 from .labels import Near
-from .lines import SINGLE_COVER, Ground, Lines, Marks, centred, find_lines
+from .lines import SINGLE_COVER, Ground, Lines, Marks, centred, find_lines, joined
 from .partner import are_within_gauge, have_partners, runs_inside
 from .pieces import (
     LEAST_SINGLE_M,
@@ -57,6 +58,10 @@ class Shown:
     height: np.ndarray
     bed: Bed
     tops: Tops
+
+    def of(self, chosen: np.ndarray) -> Shown:
+        """Choose some of the points, (n,) bool; the tops stay."""
+        return replace(self, xy=self.xy[chosen], cell=self.cell[chosen], height=self.height[chosen])
 
     def mean_heights(self) -> np.ndarray:
         """Mean height of the points of each cell up to `TOP_M` above the bed, (rows, columns); NaN without any."""
@@ -113,6 +118,17 @@ class Kept:
         pairs = number[self.pairs[chosen[self.pairs].all(axis=1)]]
         return Kept(self.lines.of(chosen), self.cell[chosen], self.paired[chosen], pairs)
 
+    def with_others(self, other: Kept, apart_m: float) -> Kept:
+        """Put cells behind these that are further than `apart_m` from all of them."""
+        if len(self.cell):
+            other = other.of(cKDTree(self.lines.axis).query(other.lines.axis)[0] > apart_m)
+        return Kept(
+            joined(self.lines, other.lines),
+            np.append(self.cell, other.cell),
+            np.append(self.paired, other.paired),
+            np.concatenate([self.pairs, other.pairs + len(self.cell)]),
+        )
+
 
 @dataclass(frozen=True)
 class Standing:
@@ -142,6 +158,14 @@ class Standing:
     unsure_m: float = 0.0
     clear_m: float = 0.0
     blur_m: float = 0.0
+
+    def with_others(self, other: Standing, apart_m: float) -> Standing:
+        """Add the points of rails that another search found, and those of its cells that are `apart_m` from these."""
+        points = np.union1d(self.points, other.points)
+        kept, rails = (
+            one.with_others(more, apart_m) for one, more in ((self.kept, other.kept), (self.rails, other.rails))
+        )
+        return replace(self, points=points, kept=kept, rails=rails)
 
 
 def on_lines(found: Candidates, reach_m: float, tolerances: Tolerances, settings: Settings) -> Kept:

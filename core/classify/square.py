@@ -59,13 +59,13 @@ def classify_square(xyz: np.ndarray, settings: Settings) -> ByShape:
     if not len(xyz):
         return nothing
     bed, height, level, z = Bed.under(xyz)
-    near = np.flatnonzero(_in_reach(bed, height, level, settings))
+    near = np.flatnonzero((height <= HIGH_M) & ~_on_vault(bed, height, level))
     if not len(near):
         return nothing
     height, xy = height[near], xyz[near, :2]
     grid, cell = Grid.around(xy[:, 0], xy[:, 1], settings.cell_m)
     tops = tops_of(grid, cell, height, z[near])
-    standing = _standing(Shown(xy, cell, height, bed, tops), settings)
+    standing = _standing(Shown(xy, cell, height, bed, tops), level[near], settings)
     near_bed = NearBed(xy, z[near], height, bed.coarse.cell[near], level[near])
     paved = NO_FLUSH if settings.blunt else flush_rails(bed.coarse.shape, near_bed, grid, cell, settings)
     in_pavement = rail.copy()
@@ -86,15 +86,6 @@ def classify_square(xyz: np.ndarray, settings: Settings) -> ByShape:
     return ByShape(rail, figures, flush)
 
 
-def _in_reach(bed: Bed, height: np.ndarray, level: np.ndarray, settings: Settings) -> np.ndarray:
-    """Return which points may show rails, (n,) bool, given their heights above the bed and their levels."""
-    in_reach = height <= HIGH_M
-    if settings.way is not Way.FILLED:
-        return in_reach & ~_on_vault(bed, height, level)
-    dense_m2 = COARSE_M**2 * np.count_nonzero(bed.coarse.count >= THIN_PER_M2 * COARSE_M**2)
-    return in_reach & (level == 0) & (dense_m2 >= LEAST_DENSE_M2)  # the vault of a tunnel is as rough as ballast
-
-
 def _on_vault(bed: Bed, height: np.ndarray, level: np.ndarray) -> np.ndarray:
     """Return which points are on a vault, (n,) bool: a level above another one that is too uneven for a bed."""
     above = np.flatnonzero(level)
@@ -106,10 +97,21 @@ def _on_vault(bed: Bed, height: np.ndarray, level: np.ndarray) -> np.ndarray:
     return on_vault
 
 
-def _standing(shown: Shown, settings: Settings) -> Standing:
-    """Find rails that stand out of their bed: bars as narrow as a head, or the ridges of a blunt cloud."""
-    if settings.way is Way.FILLED:
-        return on_low(shown, settings)
+def _standing(shown: Shown, level: np.ndarray, settings: Settings) -> Standing:
+    """Find rails that stand out of their bed, and in a cloud with filled tracks also those that hardly do."""
+    if settings.way is not Way.FILLED:
+        return _clear(shown, settings)
+    clear = _clear(shown, replace(settings, way=Way.SHARP))
+    dense_m2 = COARSE_M**2 * np.count_nonzero(shown.bed.coarse.count >= THIN_PER_M2 * COARSE_M**2)
+    if dense_m2 < LEAST_DENSE_M2:
+        return clear
+    ground = level == 0  # the vault of a tunnel is as rough as ballast
+    low = on_low(shown.of(ground), settings)
+    return clear.with_others(replace(low, points=np.flatnonzero(ground)[low.points]), settings.head_width_m)
+
+
+def _clear(shown: Shown, settings: Settings) -> Standing:
+    """Find rails that stand clear of their bed: bars as narrow as a head, or the ridges of a blunt cloud."""
     dense = settings.tolerances(thin=False)
     found = Candidates.find(shown, dense.band)
     density = density_at(shown.bed.coarse, shown.tops.grid.middles(found.marks))

@@ -16,7 +16,8 @@ from .settings import Way
 
 SHARP_M = 20.0
 """Length of rails as narrow as their heads that shows a cloud to be sharp, unless it is certainly blunt. Measured: less
-than 2 m of a drone survey's 770 m, a scanner's weeds and mixed pixels widen single metres."""
+than 2 m of a drone survey's 770 m, a scanner's weeds and mixed pixels widen single metres. As much must be found in
+addition if a cloud is to be searched for heads just above the ballast."""
 
 BLUNT_M = 100.0
 """Length of round rails that shows a cloud without these to be blunt; the rest of it need not be seen."""
@@ -164,4 +165,4 @@ def search_alike(
             yield from blunt
             return
     filled = list(search(parts, Way.FILLED))
-    yield from filled if length_m(_figures_of(filled)) > max(length_m(seen), SHARP_M) else found
+    yield from filled if length_m(_figures_of(filled)) > length_m(seen) + SHARP_M else found

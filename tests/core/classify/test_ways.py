@@ -191,6 +191,14 @@ def test_rough_ballast_hides_tops_of_heads_that_do_not_stand_clear():
     assert searched(track, Way.FILLED).paired_m == pytest.approx(2 * 16.0, abs=3.0)
 
 
+def test_a_search_for_heads_just_above_the_ballast_also_finds_those_that_stand_clear():
+    tracks = np.concatenate([filled_track(0.02, 900), filled_track(0.14, 900) + [16.0, 0.0, 0.0]])
+    assert searched(tracks, Way.SHARP).paired_m == pytest.approx(2 * 16.0, abs=3.0)
+    figures = searched(tracks, Way.FILLED)
+    assert figures.paired_m == pytest.approx(4 * 16.0, abs=4.0)
+    assert figures.filled_m == pytest.approx(2 * 16.0, abs=3.0)
+
+
 def test_heads_just_above_the_ballast_are_seen_under_the_vault_of_a_tunnel():
     tunnel = np.concatenate([filled_track(0.03, 900), filled_track(0.0, 1800) + [0.0, 0.0, 7.0]])
     assert searched(tunnel, Way.FILLED).filled_m == pytest.approx(2 * 16.0, abs=3.0)
