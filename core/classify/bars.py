@@ -93,7 +93,7 @@ def on_bars(
     sharp_m, round_m, unsure_m, clear_m = (float(share_m[kind].sum()) for kind in (*kinds, clear))
     kept = _with_kept_partners(kept.of(narrow), settings, tolerances)
     beside = Near.find(shown.xy[chosen], kept.lines)
-    rails = _are_rails(kept, beside, shown, settings, tolerances)
+    rails = _are_rails(kept, thin, beside, shown, settings, tolerances)
     standing = as_wanted(kept, rails, chosen, beside, thin, settings, tolerances)
     return replace(standing, sharp_m=sharp_m, round_m=round_m, unsure_m=unsure_m, clear_m=clear_m)
 
@@ -140,13 +140,15 @@ def _by_shape(
     return sharp, rounded, unsure
 
 
-def _are_rails(kept: Kept, beside: Near, shown: Shown, settings: Settings, tolerances: Tolerances) -> np.ndarray:
+def _are_rails(
+    kept: Kept, thin: bool, beside: Near, shown: Shown, settings: Settings, tolerances: Tolerances
+) -> np.ndarray:
     """Return which cells of narrow pieces belong to rails, (n,) bool: those with a partner, and some others.
 
     Rails without a partner are as narrow as a head and no narrower, stand as high as a rail does that is not buried in
     ballast, or as those that have a partner, their bed is not steeper than a track's, the ground beside is lower,
-    they are not guard rails, they overhang, and the other rail may be hidden. `beside` has the points in the height of
-    the heads, and the cells near them.
+    they are not guard rails, they overhang, which thin squares do not show, and the other rail may be hidden. `beside`
+    has the points in the height of the heads, and the cells near them.
     """
     partnered = with_partner(kept.pairs, kept.paired)
     if partnered.all():
@@ -169,8 +171,9 @@ def _are_rails(kept: Kept, beside: Near, shown: Shown, settings: Settings, toler
     alone &= mean_of(free, piece) > MAJORITY
     mine = alone[piece] & ~partnered
     lines, (numbers, number) = kept.lines.of(mine), np.unique(piece[mine], return_inverse=True)
-    hidden = may_hide_partner(lines, number, shown.tops, settings, tolerances.partner_m)
-    alone[numbers] = hidden & ~are_solid(lines, number, shown.xy, shown.height, settings.head_width_m)
+    alone[numbers] = may_hide_partner(lines, number, shown.tops, settings, tolerances.partner_m)
+    if not thin:  # wide beams blend a face with what is below it
+        alone[numbers] &= ~are_solid(lines, number, shown.xy, shown.height, settings.head_width_m)
     return partnered | alone[piece]
 
 

@@ -162,6 +162,20 @@ def test_a_rail_of_a_canted_track_that_hides_all_of_its_bed_has_its_partner():
     assert figures.paired_m > 0.95 * (figures.paired_m + figures.single_m) > 20
 
 
+@pytest.mark.parametrize(("per_m2", "found_m"), [(200, 16.5), (5000, 0.0)])
+def test_a_face_that_goes_straight_down_is_no_kerb_in_a_thin_cloud(per_m2, found_m):
+    """In world 11646, wide beams of a drone blended the head with its web, and a train hid the other rail."""
+    rng = np.random.RandomState(25)
+    xyz, on = with_bar(rough(flat(16.0, rng=rng, per_m2=per_m2), rng), WIDTH, 0.3)
+    face = np.repeat(xyz[on], 2, axis=0)
+    face[:, :2] += np.outer(WIDTH / 2 + 0.01 - turned(face, 0.3)[1], [-np.sin(0.3), np.cos(0.3)])
+    face[:, 2] -= rng.uniform(0.0, 0.12, len(face))
+    xyz = np.concatenate([xyz, face])
+    left = turned(xyz, 0.3)[1]
+    shown = np.abs(left + SPACING) > 0.45
+    assert classify_square(xyz[shown], SETTINGS).figures.single_m == pytest.approx(found_m, abs=1.0)
+
+
 def test_rails_of_a_canted_track_in_ballast_up_to_the_heads_are_labelled():
     """On the higher side of each rail the bed rises to its top."""
     rng = np.random.RandomState(18)
