@@ -226,9 +226,10 @@ class Terrain:
 
     def heights(self, world: World) -> np.ndarray:
         """Heights of the ground of a world, (profiles, m)."""
-        across = world.across_m
-        top = np.nan_to_num(world.ways[0].top_m)[:, None]
-        wave = 0.08 * np.sin(2 * np.pi * world.station / self.wave_m)[:, None] * (self.beyond_m(across) > 0)
+        across, way = world.across_m, world.ways[0]
+        along = world.station[:, None] + world.shear * across
+        top = np.interp(along, world.station + world.shear * np.nan_to_num(way.left_m), np.nan_to_num(way.top_m))
+        wave = 0.08 * np.sin(2 * np.pi * along / self.wave_m) * (self.beyond_m(across) > 0)
         height = top + self.shape(across) + wave
         for way in world.ways:
             # Where branches enter a slope, it has been dug away.
