@@ -119,7 +119,7 @@ class Kept:
         return Kept(self.lines.of(chosen), self.cell[chosen], self.paired[chosen], pairs)
 
     def with_others(self, other: Kept, apart_m: float) -> Kept:
-        """Put cells behind these that are further than `apart_m` from all of them."""
+        """Put cells behind these that are further than `apart_m` from all of them; these state the reach of both."""
         if len(self.cell):
             other = other.of(cKDTree(self.lines.axis).query(other.lines.axis)[0] > apart_m)
         return Kept(

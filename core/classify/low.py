@@ -66,9 +66,8 @@ class Low:
     """What lines through cells show, (rows, columns) arrays.
 
     `rise` is how far the line is above the higher one of its sides, metres, in the direction in which this is most
-    certain, and `base` the height of this side above the bed; NaN where no line is seen. A
-    side in shadow is lower. `crest` says which cells may be on a head: the line is certainly above its sides, and more
-    so than those beside it.
+    certain, and `base` the height of this side above the bed; NaN where no line is seen. A side in shadow is lower.
+    `crest` says which cells may be on a head: the line is certainly above its sides, and more so than those beside it.
     """
 
     rise: np.ndarray

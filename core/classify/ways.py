@@ -16,8 +16,8 @@ from .settings import Way
 
 SHARP_M = 20.0
 """Length of rails as narrow as their heads that shows a cloud to be sharp, unless it is certainly blunt. Measured: less
-than 2 m of a drone survey's 770 m, a scanner's weeds and mixed pixels widen single metres. As much must be found in
-addition if a cloud is to be searched for heads just above the ballast."""
+than 2 m of a drone survey's 770 m, a scanner's weeds and mixed pixels widen single metres. The
+search for heads just above the ballast counts if it finds as much more."""
 
 BLUNT_M = 100.0
 """Length of round rails that shows a cloud without these to be blunt; the rest of it need not be seen."""

@@ -159,6 +159,11 @@ class World:
         """Places across at which the ground is sampled, (m,)."""
         return np.arange(-self.half_width_m, self.half_width_m + ACROSS_STEP_M, ACROSS_STEP_M)
 
+    @property
+    def along_m(self) -> np.ndarray:
+        """Chainages of the places at which the ground is sampled, (profiles, m)."""
+        return self.station[:, None] + self.shear * self.across_m
+
     def box(
         self,
         left_m: np.ndarray | float,
@@ -304,8 +309,7 @@ def ground(world: World, terrain_m: np.ndarray | None = None, where: np.ndarray 
     reference = world.ways[0].top_m[:, None] if world.ways else np.zeros((len(world.station), 1))
     terrain = reference - bedding.terrain_m if terrain_m is None else terrain_m
     terrain = np.broadcast_to(terrain, height.shape) + bedding.terrain_roughness_m / STONE_HEIGHT_M * stones
-    along = world.station[:, None] + world.shear * across
-    sleeper = along % bedding.sleeper_step_m < bedding.sleeper_width_m
+    sleeper = world.along_m % bedding.sleeper_step_m < bedding.sleeper_width_m
     half_m = bedding.sleeper_length_m / 2
     below = RAIL_HEIGHT_M * world.head_width_m / 0.072 + PAD_M
     for way in world.ways:

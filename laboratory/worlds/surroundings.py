@@ -226,8 +226,7 @@ class Terrain:
 
     def heights(self, world: World) -> np.ndarray:
         """Heights of the ground of a world, (profiles, m)."""
-        across, way = world.across_m, world.ways[0]
-        along = world.station[:, None] + world.shear * across
+        across, along, way = world.across_m, world.along_m, world.ways[0]
         top = np.interp(along, world.station + world.shear * np.nan_to_num(way.left_m), np.nan_to_num(way.top_m))
         wave = 0.08 * np.sin(2 * np.pi * along / self.wave_m) * (self.beyond_m(across) > 0)
         height = top + self.shape(across) + wave
