@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, is_dataclass
+from dataclasses import dataclass, is_dataclass, replace
 from functools import wraps
 from types import GeneratorType
 from typing import Any
@@ -104,6 +104,7 @@ SWITCHES = (
     _rule("classify.partner._belongs_to_another", lambda lines, other, apart_m, *_: np.zeros(apart_m.shape, bool)),
     _rule("classify.partner._majority", first),
     _rule("classify.labels.MIN_AXES", 1),
+    _rule("classify.blunt._on_heads", lambda kept, crests, *_: replace(kept, lines=crests)),
     _rule("classify.tops._around", first),
     _rule("clouds.on_heads.BELOW_SHARE", 1.0),
     _rule("squares.steps.told_apart", first),
@@ -115,6 +116,7 @@ SWITCHES = (
     _rule("heads.axis._either_end", lambda points: np.zeros(len(points.stations))),
     _rule("heads.axis.hidden_edges", lambda points: np.zeros(points.free.shape, dtype=bool)),
     _rule("heads.edges._excess", np.zeros_like),
+    _rule("heads.edges._are_wide", lambda points: np.zeros(len(points.stations), dtype=bool)),
     _rule("heads.sections._pull", lambda station, is_left, count: np.zeros(count)),
     _rule("heads.sections._half_apart", lambda *_: 0.0),
     _rule("heads.own_level.SHIFTED_M", 0.0),

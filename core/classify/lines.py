@@ -126,6 +126,10 @@ class Lines:
         """Return the numbers of the cells that are on a line, (k,) int."""
         return np.flatnonzero((self.cover >= cover) & (self.pure >= pure))
 
+    def moved(self, left_m: np.ndarray) -> Lines:
+        """Move axes to the left, by (n,) metres."""
+        return replace(self, axis=self.axis + left_m[:, None] * self.across)
+
     def of(self, chosen: np.ndarray) -> Lines:
         """Choose some of the cells."""
         return Lines(
@@ -267,4 +271,4 @@ def centred(lines: Lines, cells: Marks, half_m: float, along_m: float) -> Lines:
         on = np.abs(left - offset[own]) < half_m
         members = np.bincount(own[on], minlength=len(offset))
         offset = np.bincount(own[on], left[on], len(offset)) / np.maximum(members, 1)
-    return replace(lines, axis=lines.axis + offset[:, None] * lines.across)
+    return lines.moved(offset)

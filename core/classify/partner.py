@@ -60,6 +60,18 @@ def have_partners(lines: Lines, spacings_m: Sequence[float], height_m: float, wo
     return np.max(stations, axis=0) >= MIN_STATIONS
 
 
+def off_gauge(lines: Lines, spacings_m: Sequence[float], tolerance_m: float, height_m: float) -> np.ndarray:
+    """Return how much the distance of each cell's line from its partner differs from the best of those of two heads.
+
+    Metres, (n,); infinite without a partner. See `partners` for the tolerances.
+    """
+    off_m = np.full(len(lines.axis), np.inf)
+    for spacing_m in spacings_m:
+        stations, _, apart_m = partners(lines, spacing_m, tolerance_m, height_m)
+        off_m = np.where(stations >= MIN_STATIONS, np.fmin(np.abs(apart_m - spacing_m), off_m), off_m)
+    return off_m
+
+
 def are_within_gauge(lines: Lines, piece: np.ndarray, spacings_m: Sequence[float], height_m: float) -> np.ndarray:
     """Return which pieces, of (n,) cells, are near enough to their partners for a track, (pieces,) bool.
 

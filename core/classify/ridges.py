@@ -6,6 +6,7 @@ and rounds its top; in between, it is as wide as a head is in any cloud (docs/cl
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -57,6 +58,15 @@ both of its rails alike."""
 CRESTS_M = np.arange(-0.06, 0.061, 0.004)
 """Places across at which a crest is looked for: half a head and a cell to either side of the axis of the cells."""
 
+HALF_WAY = (0.5,)
+"""Part of the way down at which the two sides of a ridge are: there, blur does not move the side of a head."""
+
+SIDES_M = np.linspace(-1.0, 1.0, 11)
+"""Places along the line at which the sides of a ridge are looked at: check rails are 3 m long and more."""
+
+TOP_BINS = 6
+"""Bins on either side of the axis within which the top of a ridge is: the axis may be at the side of a wide one."""
+
 ALONG_M = 2.0
 """Length to either side whose points show one crest: noise of 15 mm moves it by 4 mm over 4 m, and by 8 mm over 1 m."""
 
@@ -84,7 +94,7 @@ class Ridges:
         sides = sections[:, middle:], sections[:, middle - 1 :: -1]
         with np.errstate(invalid="ignore"):
             top = np.fmax(*(side[:, 0] for side in sides))
-            places = np.array([_levels(side, top) for side in sides])
+            places = np.array([_levels(side, top, LEVELS) for side in sides])
             spread_m = np.mean(places[:, 1] - places[:, 0], axis=0) / EDGE_PER_SIGMA
         return cls(places[:, 0].sum(axis=0), spread_m, lengths(lines.axis, piece))
 
@@ -125,6 +135,35 @@ def on_crests(xy: np.ndarray, height: np.ndarray, lines: Lines, blur_m: float) -
     return replace(lines, axis=lines.axis + offset_m[:, None] * across)
 
 
+def sides_of(level: np.ndarray, grid: Grid, lines: Lines) -> tuple[np.ndarray, np.ndarray]:
+    """Find how far the left and the right side of each ridge is from its line, half-way down, (n,) metres.
+
+    `level`, (rows, columns), is the mean height of each cell above the bed. NaN where a side is not seen as far down.
+    """
+    rise, seen = np.zeros((2, len(lines.axis), BINS))
+    for ahead_m in SIDES_M:
+        for number in range(BINS):
+            across_m = (number - BINS / 2 + 0.5) * BIN_M
+            cell, inside = grid.cells(lines.axis + ahead_m * lines.along + across_m * lines.across)
+            up = level.ravel()[cell] - lines.height
+            known = inside & np.isfinite(up)
+            rise[known, number] += up[known]
+            seen[:, number] += known
+    with np.errstate(invalid="ignore"):
+        sections, middle = rise / seen, BINS // 2
+    top = np.fmax.reduce(sections[:, middle - TOP_BINS : middle + TOP_BINS], axis=1)
+    left, right = sections[:, middle:], sections[:, middle - 1 :: -1]
+    return _levels(left, top, HALF_WAY)[0], _levels(right, top, HALF_WAY)[0]
+
+
+def mean_along(values: np.ndarray, lines: Lines, within_m: float) -> np.ndarray:
+    """Mean of the values of the cells that are on each cell's line within a distance, (n,); NaN where none is known."""
+    known = np.isfinite(values)
+    same = _along(np.arange(len(values)), links(lines, within_m))
+    with np.errstate(invalid="ignore"):
+        return (same @ np.where(known, values, 0.0)) / (same @ known.astype(float))
+
+
 def steadied(lines: Lines) -> Lines:
     """Move axes to the mean of those near them, see `STEADY_M`, and heights to theirs."""
     if not len(lines.axis):
@@ -138,7 +177,7 @@ def steadied(lines: Lines) -> Lines:
     some = 1 + np.bincount(own, minlength=len(lines.axis))
     offset_m = np.bincount(own, left_m, len(lines.axis)) / some
     height = (lines.height + np.bincount(own, lines.height[other], len(lines.axis))) / some
-    return replace(lines, axis=lines.axis + offset_m[:, None] * lines.across, height=height)
+    return replace(lines.moved(offset_m), height=height)
 
 
 def cells_beside(grid: Grid, lines: Lines, half_m: float) -> np.ndarray:
@@ -216,8 +255,8 @@ def _around(xy: np.ndarray, places: np.ndarray, reach_m: float) -> np.ndarray:
     return np.flatnonzero(around[column, row])
 
 
-def _levels(side: np.ndarray, top: np.ndarray) -> np.ndarray:
-    """Distances from the axis at which one side of each ridge falls below the levels, (levels, pieces) metres.
+def _levels(side: np.ndarray, top: np.ndarray, levels: Sequence[float]) -> np.ndarray:
+    """Distances from the axis at which one side of each ridge falls below levels, (levels, pieces) metres.
 
     `side`, (pieces, bins), has heights outwards from the axis, and `top`, (pieces,), those of the ridges.
     """
@@ -227,7 +266,7 @@ def _levels(side: np.ndarray, top: np.ndarray) -> np.ndarray:
     base = np.where(has_base, np.fmin.reduce(side[:, :bins], axis=1), np.nan)
     rows = np.arange(len(side))
     found = []
-    for share in LEVELS:
+    for share in levels:
         level = top - share * (top - base)
         below = side < level[:, None]
         after = np.argmax(below, axis=1)

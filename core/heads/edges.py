@@ -9,9 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
+from scipy.ndimage import maximum_filter1d, minimum_filter1d, uniform_filter1d
 
-from .head_points import BLUR_BINS, HALF_HEAD_BINS, HALF_RANGE_BINS, HeadPoints
+from .head_points import BLUR_BINS, HALF_HEAD_BINS, HALF_RANGE_BINS, STATION_STEP_M, HeadPoints
 from .level import OFF_TOP_SIGMAS, SLOPE_ROUNDS, robust_sigma, rough_level
 
 MAX_SHIFT_BINS = 15
@@ -70,6 +70,23 @@ MIN_BEND = 0.5
 CREST_SIGMA_M = 0.003
 """Standard error of a crest that more points would not reduce: a blur of 4 cm blends a head with ballast that is higher
 by 2 or 3 cm on one side, and an oblique beam with what it sees on its own side of the rail."""
+
+LEAST_POINTS = 1e-6
+"""Points that the fit of a window is short of: it keeps the fit finite where none are seen."""
+
+WIDE_WINDOW = 9
+"""Stations, 2.25 m, over which it is measured how far a ridge is bent: check rails are 3 m long and more."""
+
+MOST_BENT = 0.25
+"""Quantile of the windows of a line whose bend is that of a single head: up to half of a short line may be wide."""
+
+WIDE_BEND = 0.67
+"""Bend of a ridge by that of a single head below which it is wider. Two heads side by side, as of a check or wing rail,
+make a ridge whose crest is 10 to 60 mm off the axis (median in seven worlds from images); from 0.75 on, it is 5 to 7 mm
+off. Half of it, as bent as a head on one side only, is bent by 0.5."""
+
+WIDE_SIGMA_M = 0.04
+"""Standard error of a metre of line along such a ridge: it stays where it was drawn, in a cell of the raster."""
 
 TILT = 0.035
 """Standard deviation of the slope across of tracks, whose cant is up to 90 mm. A blurred head does not show it, and its
@@ -223,8 +240,8 @@ class Ridge:
     def find(cls, points: HeadPoints) -> Ridge | None:
         """Fit one parabola, and a crest for each window, to points; None with too few, or if they are not blunt.
 
-        Next to another head, both are one ridge, whose crest is between them. Points on the top decide alone where
-        those beside it draw the crest of the line aside.
+        Next to another head, both are one ridge, whose crest is between them: where it is wider than one head, the line
+        stays as it is. Points on the top decide alone where those beside it draw the crest of the line aside.
         """
         near = points[points.within(REACH_HEADS)]
         near = near[near.alone] if np.count_nonzero(near.alone) >= LEAST_ON_RIDGE else near
@@ -239,6 +256,8 @@ class Ridge:
             doubt_m = np.hypot(CREST_SIGMA_M, ASIDE_SIGMAS / np.sqrt(of_top[1].sum()))
             if abs(np.average(of_top[0] - crest, weights=of_top[1])) > doubt_m:
                 crest, information, bend = of_top
+        wide = _are_wide(near)
+        crest[wide], information[wide] = 0.0, STATION_STEP_M / WIDE_SIGMA_M**2
         return cls(near.stations, crest, information, np.full(len(crest), np.hypot(CREST_SIGMA_M, TILT / bend)))
 
 
@@ -256,6 +275,23 @@ def _fitted(near: HeadPoints, likely: np.ndarray) -> tuple[np.ndarray, np.ndarra
             break
         used = ~off
     return crest, information, bend
+
+
+def _are_wide(near: HeadPoints) -> np.ndarray:
+    """Return at which stations the ridge is certainly bent less than that of a single head, (s,) bool."""
+    x, up = near.across / near.width_m, near.z - rough_level(near.t, near.z)
+    terms = np.stack([np.ones_like(x), x, x**2])
+    whole, count = np.linalg.lstsq(terms.T, up, rcond=None)[0], len(terms)
+    sums = np.array([near.per_station(one * other) for one in terms for other in (*terms, up)])
+    windows = uniform_filter1d(sums, WIDE_WINDOW, axis=1, mode="constant") * WIDE_WINDOW
+    normal, right = np.split(windows.T.reshape(-1, count, count + 1), [count], axis=2)
+    inverse = np.linalg.inv(normal + LEAST_POINTS * np.eye(count))
+    curve, error = (inverse @ right)[:, 2, 0], robust_sigma(up - whole @ terms) * np.sqrt(inverse[:, 2, 2])
+    seen = normal[:, 0, 0] >= LEAST_ON_RIDGE
+    if not seen.any():
+        return seen
+    wide = curve - error > WIDE_BEND * min(float(np.quantile(curve[seen], MOST_BENT)), 0.0)
+    return minimum_filter1d(maximum_filter1d(wide, WIDE_WINDOW), WIDE_WINDOW)  # without gaps shorter than a window
 
 
 def _crests(

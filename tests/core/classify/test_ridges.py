@@ -65,6 +65,31 @@ def test_a_rail_has_no_gaps_in_images_and_a_row_of_sleepers_has(gaps_m, found):
     assert (found_m(np.where(ends[:, None], shape, plain)).paired_m > SIDE_M) == found
 
 
+def with_check_rails(xyz, blur_m, sides, first_m=6.0, last_m=10.0):
+    """Points of `bars` whose check rails, a flangeway of 45 mm from each, are on these sides, 1 for the left."""
+    across = np.clip(np.abs(xyz[:, 1] - (first_m + last_m) / 2) - (last_m - first_m) / 2, 0.0, None)
+    shown = np.exp(-0.5 * (across / blur_m) ** 2)
+    xyz = xyz.copy()
+    for rail_m, side in zip(7.0 + (GAUGE_M + WIDTH_M) * np.array([-0.5, 0.5]), sides):
+        off_m = xyz[:, 0] - (rail_m - side * (WIDTH_M + 0.045))
+        rise = ndtr((off_m + MATCHED_M / 2) / blur_m) - ndtr((off_m - MATCHED_M / 2) / blur_m)
+        xyz[:, 2] += 0.17 * abs(side) * shown * rise
+    return xyz
+
+
+@pytest.mark.parametrize("sides", [(-1, 1), (-1, 0)], ids=["both", "one"])
+def test_a_rail_is_at_gauge_beside_the_check_rail_with_which_it_is_one_ridge(sides):
+    """Of a ridge of two heads, the crest is between both."""
+    xyz = with_check_rails(bars(MATCHED_M, 0.17, 0.05), 0.05, sides)
+    rail = classify_square(xyz, Settings((GAUGE_M,), WIDTH_M, way=Way.BLUNT)).rail
+    x, y, _ = xyz[rail].T
+    for rail_m in 7.0 + (GAUGE_M + WIDTH_M) * np.array([-0.5, 0.5]):
+        near = np.abs(x - rail_m) < 0.2
+        beside = near & (np.abs(y - 8.0) < 1.5)
+        assert np.count_nonzero(beside) > 0.1 * np.count_nonzero(near)
+        assert abs(np.mean(x[beside]) - rail_m) < 0.015
+
+
 def lines_beside(across_m):
     """Cells of a line along x, 4 cm apart, with their axes aside."""
     along_m = 0.04 * np.arange(len(across_m))

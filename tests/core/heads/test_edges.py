@@ -53,6 +53,18 @@ def test_chance_does_not_choose_the_few_points_on_the_top_of_a_short_line():
         assert abs(np.average(ridge.offset_m, weights=ridge.information)) < 0.005
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_a_line_stays_along_a_ridge_that_is_wider_than_a_head(seed):
+    """As that of a head and the check rail beside it: its crest is between both."""
+    t, across, z = ridge_points(noise_m=0.002, seed=seed)
+    beside = (t > 17.0) & (t < 23.0) & (across > 0)
+    z[beside] += 0.5 * BEND * across[beside] ** 2
+    ridge = ridge_of(t, across, z)
+    beside, elsewhere = np.abs(ridge.t - 20.0) < 1.5, np.abs(ridge.t - 20.0) > 4.0
+    assert abs(np.average(ridge.offset_m[beside], weights=ridge.information[beside])) < 0.002
+    assert ridge.information[beside].mean() < 0.1 * ridge.information[elsewhere].mean()
+
+
 @pytest.mark.parametrize("count", [0, 1, 2, 3, 5, 12])
 def test_a_few_points_show_a_crest_or_none(count):
     """Two points of the branch of a world drawn at random stopped the whole run."""
