@@ -106,6 +106,7 @@ SWITCHES = (
     _rule("classify.labels.MIN_AXES", 1),
     _rule("classify.blunt._on_heads", lambda kept, crests, *_: replace(kept, lines=crests)),
     _rule("classify.tops._around", first),
+    _rule("classify.tops.SHADOWED_SHARE", 0.5),
     _rule("clouds.on_heads.BELOW_SHARE", 1.0),
     _rule("squares.steps.told_apart", first),
     _rule("heads.refinement._points_of_arc", lambda *_: np.zeros(2)),
