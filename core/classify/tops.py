@@ -29,7 +29,7 @@ bed and what is not seen may be in a shadow. A rail fills 0.14 to 0.25, with its
 kerbs half and more; two heads in a switch, in whose shadows nothing of the ground is seen, 0.45 to 0.70."""
 
 CLEAR_M = 2 * DEPTH_M
-"""Height above the bed from which stones are no part of a top, because they scatter by less than `DEPTH_M`."""
+"""Height above the bed from which a top has no stones in it, because these scatter by less than `DEPTH_M`."""
 
 EMPTY = np.int16(-32768)
 """Top of a cell without points."""
