@@ -117,7 +117,7 @@ SWITCHES = (
     _rule("heads.axis._either_end", lambda points: np.zeros(len(points.stations))),
     _rule("heads.axis.hidden_edges", lambda points: np.zeros(points.free.shape, dtype=bool)),
     _rule("heads.edges._excess", np.zeros_like),
-    _rule("heads.edges._are_wide", lambda points: np.zeros(len(points.stations), dtype=bool)),
+    _rule("heads.edges._are_wide", lambda points, _: np.zeros(len(points.stations), dtype=bool)),
     _rule("heads.sections._pull", lambda station, is_left, count: np.zeros(count)),
     _rule("heads.sections._half_apart", lambda *_: 0.0),
     _rule("heads.own_level.SHIFTED_M", 0.0),

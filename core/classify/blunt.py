@@ -18,7 +18,7 @@ WIDER_M = 0.03
 """How much wider half-way down than most ridges of the square one is that has more than one head in it. Up to 20 mm
 more, crests are 8 mm off the axis (median in four worlds from images), from 40 mm on 38 to 55 mm."""
 
-ALONG_M = 1.0
+AVERAGED_M = 1.0
 """Length to either side over which this is averaged: that of single cells scatters by 12 mm."""
 
 AT_GAUGE_M = 0.04
@@ -60,15 +60,13 @@ def _on_heads(kept: Kept, crests: Lines, shown: Shown, settings: Settings) -> Ke
     if not np.isfinite(width_m).any():
         return replace(kept, lines=crests)
     head_m = float(np.nanmedian(width_m))
-    wider_m = mean_along(width_m - head_m, kept.lines, ALONG_M)
+    wider_m = mean_along(width_m - head_m, kept.lines, AVERAGED_M)
     is_wide = (wider_m > WIDER_M) & np.isfinite(width_m)
     wide, narrow = np.flatnonzero(is_wide), np.flatnonzero(~is_wide)
     left, right = (kept.lines.moved(by_m).of(wide) for by_m in (left_m - head_m / 2, head_m / 2 - right_m))
-    every = joined(joined(crests.of(narrow), joined(left, right)), crests.of(wide))
-    on_side = slice(len(narrow), len(narrow) + 2 * len(wide))
-    off_m = off_gauge(every.of(np.arange(on_side.stop)), settings.spacings_m, AT_GAUGE_M, BLUNT.partner_m)
-    off_m = off_m[on_side].reshape(2, -1)
+    heads = joined(crests.of(narrow), joined(left, right))
+    off_m = off_gauge(heads, settings.spacings_m, AT_GAUGE_M, BLUNT.partner_m)[len(narrow) :].reshape(2, -1)
     best = np.isfinite(off_m) & ((off_m <= off_m.min(axis=0)) | (wider_m[wide] >= settings.head_width_m))
     chosen = np.concatenate([np.ones(len(narrow), dtype=bool), *best, ~best.any(axis=0)])
-    lines, number = every.of(chosen), np.concatenate([narrow, wide, wide, wide])[chosen]
+    lines, number = joined(heads, crests.of(wide)).of(chosen), np.concatenate([narrow, wide, wide, wide])[chosen]
     return Kept(lines, kept.cell[number], kept.paired[number], links(lines))

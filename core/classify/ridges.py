@@ -139,6 +139,7 @@ def sides_of(level: np.ndarray, grid: Grid, lines: Lines) -> tuple[np.ndarray, n
     """Find how far the left and the right side of each ridge is from its line, half-way down, (n,) metres.
 
     `level`, (rows, columns), is the mean height of each cell above the bed. NaN where a side is not seen as far down.
+    A wide ridge may have two rows of lines, so points are not divided among the nearest ones, as in `_profiles`.
     """
     rise, seen = np.zeros((2, len(lines.axis), BINS))
     for ahead_m in SIDES_M:

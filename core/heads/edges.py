@@ -250,20 +250,29 @@ class Ridge:
         sums = np.array([near.per_station().astype(float), near.per_station(near.across)])
         count, across = uniform_filter1d(sums, WINDOW, axis=1, mode="constant")
         likely, top = across / np.maximum(count, 1e-9), near[near.within(TOP_HEADS)]
-        crest, information, bend = _fitted(near, likely)
+        up = _above_level(near)
+        crest, information, bend = _fitted(near, up, likely)
         if len(top.t) >= LEAST_ON_RIDGE:
-            of_top = _fitted(top, likely)
+            of_top = _fitted(top, _above_level(top), likely)
             doubt_m = np.hypot(CREST_SIGMA_M, ASIDE_SIGMAS / np.sqrt(of_top[1].sum()))
             if abs(np.average(of_top[0] - crest, weights=of_top[1])) > doubt_m:
                 crest, information, bend = of_top
-        wide = _are_wide(near)
+        wide = _are_wide(near, up)
         crest[wide], information[wide] = 0.0, STATION_STEP_M / WIDE_SIGMA_M**2
         return cls(near.stations, crest, information, np.full(len(crest), np.hypot(CREST_SIGMA_M, TILT / bend)))
 
 
-def _fitted(near: HeadPoints, likely: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-    """Return the crest at each station and the information about it, (s,) each, and the bend of the parabola."""
-    row, x, up = near.station, near.across, near.z - rough_level(near.t, near.z)
+def _above_level(points: HeadPoints) -> np.ndarray:
+    """Return the heights of points above the rough level of their line, (n,) metres."""
+    return points.z - rough_level(points.t, points.z)
+
+
+def _fitted(near: HeadPoints, up: np.ndarray, likely: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+    """Return the crest at each station and the information about it, (s,) each, and the bend of the parabola.
+
+    `up`, (n,), are the heights of the points above the rough level of the line.
+    """
+    row, x = near.station, near.across
     used = np.ones(len(x), dtype=bool)
     for _ in range(SLOPE_ROUNDS):
         bend = max(-2 * float(np.polynomial.polynomial.polyfit(x[used], up[used], 2)[2]), MIN_BEND)
@@ -277,9 +286,9 @@ def _fitted(near: HeadPoints, likely: np.ndarray) -> tuple[np.ndarray, np.ndarra
     return crest, information, bend
 
 
-def _are_wide(near: HeadPoints) -> np.ndarray:
+def _are_wide(near: HeadPoints, up: np.ndarray) -> np.ndarray:
     """Return at which stations the ridge is certainly bent less than that of a single head, (s,) bool."""
-    x, up = near.across / near.width_m, near.z - rough_level(near.t, near.z)
+    x = near.across / near.width_m
     terms = np.stack([np.ones_like(x), x, x**2])
     whole, count = np.linalg.lstsq(terms.T, up, rcond=None)[0], len(terms)
     sums = np.array([near.per_station(one * other) for one in terms for other in (*terms, up)])
