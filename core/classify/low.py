@@ -13,10 +13,10 @@ import numpy as np
 from scipy.ndimage import uniform_filter
 
 from .cells import Candidates, Shown, Standing, as_wanted, density_at, fitting, on_lines, on_rails, with_pairs
-from .labels import Near, label, whole_heads
-from .lines import reach_at
+from .labels import Near, label
+from .lines import Lines, reach_at
 from .pieces import pieces_of, with_partner
-from .ridges import Ridges
+from .ridges import Ridges, cells_beside, on_crests
 from .settings import Settings
 from .tops import EMPTY, MILLIMETRES, WINDOW_M, Grid
 
@@ -52,6 +52,11 @@ CERTAIN = 4.5
 
 CREST_CELLS = 2
 """Cells to either side than which a crest is not lower: a head is as wide."""
+
+ON_HEAD_M = 0.10
+"""Distance from an axis up to which points show where its head is: half a head, the 3 cm by which axes of cells are
+off, and as much of the ballast. Tripods see nothing nearer on the far side of a head, and what is further away may be
+a check rail."""
 
 HIGHEST_M = 0.10
 """Height above its surroundings below which points may be of a head that stands just out of its bed: those of wheels
@@ -93,9 +98,19 @@ def on_low(shown: Shown, settings: Settings) -> Standing:
         width_m = Ridges.measure(shown.xy[of_heads], shown.height[of_heads], kept.lines, piece).width_m
         too_wide = width_m >= settings.head_width_m + tolerances.wider_m  # where one side is hidden, this is not known
         kept = fitting(kept, piece, ~too_wide, settings, tolerances)
-    chosen = label(shown.tops, whole_heads(shown.tops, kept.cell, tolerances), shown.cell, shown.height, tolerances)
+        kept = replace(kept, lines=_on_heads(shown.of(of_heads), kept.lines, settings.head_width_m))
+    cells = cells_beside(grid, kept.lines, (settings.head_width_m - grid.cell_m) / 2)
+    chosen = label(shown.tops, cells, shown.cell, shown.height, tolerances)
     beside = Near.find(shown.xy[chosen], kept.lines)
     return as_wanted(kept, np.ones(len(kept.cell), dtype=bool), chosen, beside, False, settings, tolerances)
+
+
+def _on_heads(shown: Shown, lines: Lines, head_width_m: float) -> Lines:
+    """Move axes to the middle of their heads: a cell that is half on the ballast is as high as one on the head.
+
+    The ridge whose cross-section has the area of a head as high as it stands for the head.
+    """
+    return on_crests(shown.xy, shown.height, lines, head_width_m / float(np.sqrt(2 * np.pi)), ON_HEAD_M)
 
 
 def find_low(grid: Grid, level: np.ndarray) -> Low:

@@ -28,6 +28,9 @@ BIN_M = 0.01
 
 BINS = 2 * round(REACH_M / BIN_M)
 
+ACROSS_M = (np.arange(BINS) - BINS / 2 + 0.5) * BIN_M
+"""Middles of the bins, from the axis to the left."""
+
 BASE_M = 0.20
 """Distance from the axis within which a side is lowest at its base, and of which the outer half must be seen: the
 shoulder of the ballast may fall further on."""
@@ -114,11 +117,11 @@ class Ridges:
             return self.width_m < head_width_m + WIDER_M
 
 
-def on_crests(xy: np.ndarray, height: np.ndarray, lines: Lines, blur_m: float) -> Lines:
+def on_crests(xy: np.ndarray, height: np.ndarray, lines: Lines, blur_m: float, reach_m: float = REACH_M) -> Lines:
     """Move axes onto the crests of their ridges, of standard deviation `blur_m`, given points by place and height.
 
     The tops of the cells of a ridge are led aside by ballast that is higher on one side. The ridge is a Gaussian on a
-    plane bed, and the slope of the bed does not move it.
+    plane bed, and the slope of the bed does not move it. Points within `reach_m` of the axes show it.
     """
     if not len(lines.axis):
         return lines
@@ -126,7 +129,9 @@ def on_crests(xy: np.ndarray, height: np.ndarray, lines: Lines, blur_m: float) -
     across = to_one_side(lines, pieces_of(len(own), pairs))
     count, rise = _profiles(xy, height, lines, across, own)
     same = _along(own, pairs)
+    beyond = np.abs(ACROSS_M) > reach_m
     count, rise = same @ count, same @ rise
+    count[:, beyond] = rise[:, beyond] = 0.0
     fits = np.array([_explained(count, rise, crest_m, blur_m) for crest_m in CRESTS_M])
     best = np.clip(np.argmax(fits, axis=0), 1, len(CRESTS_M) - 2)
     before, at, after = (fits[best + step, np.arange(len(best))] for step in (-1, 0, 1))
@@ -143,8 +148,7 @@ def sides_of(level: np.ndarray, grid: Grid, lines: Lines) -> tuple[np.ndarray, n
     """
     rise, seen = np.zeros((2, len(lines.axis), BINS))
     for ahead_m in SIDES_M:
-        for number in range(BINS):
-            across_m = (number - BINS / 2 + 0.5) * BIN_M
+        for number, across_m in enumerate(ACROSS_M.tolist()):
             cell, inside = grid.cells(lines.axis + ahead_m * lines.along + across_m * lines.across)
             up = level.ravel()[cell] - lines.height
             known = inside & np.isfinite(up)
@@ -194,8 +198,7 @@ def _explained(count: np.ndarray, rise: np.ndarray, crest_m: float, blur_m: floa
     `count` and `rise`, (k, BINS), are the points by bin and the sum of their heights; `blur_m` is the standard
     deviation of the ridge.
     """
-    across = (np.arange(BINS) - BINS / 2 + 0.5) * BIN_M
-    model = np.stack([np.ones(BINS), across / REACH_M, np.exp(-0.5 * ((across - crest_m) / blur_m) ** 2)])
+    model = np.stack([np.ones(BINS), ACROSS_M / REACH_M, np.exp(-0.5 * ((ACROSS_M - crest_m) / blur_m) ** 2)])
     normal = np.einsum("kb,ib,jb->kij", count, model, model) + LEAST_POINTS * np.eye(len(model))
     right = rise @ model.T
     return np.einsum("ki,ki->k", right, np.linalg.solve(normal, right[:, :, None])[:, :, 0])

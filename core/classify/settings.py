@@ -124,9 +124,10 @@ something else by chance. Beside its crest, the ridge falls by up to 5 cm; noise
 limit that cut the lower side off would move the line, and one near the mean of the tops would lower it."""
 
 
-FILLED = replace(DENSE, least_m=BLUNT.least_m, wider_m=0.025)
+FILLED = replace(DENSE, least_m=BLUNT.least_m, beside_m=0.01, wider_m=0.025)
 """For heads just above the ballast that a track is filled with: as in blunt clouds, up to 4 m of something are at gauge
-from something else by chance. Boards are hardly wider than heads that passes show apart."""
+from something else by chance. Boards are hardly wider than heads that passes show apart. Stones beside a head are as
+high as its faces and would draw its axis: points are on it up to the error of the axis alone."""
 
 
 class Way(Enum):

@@ -146,11 +146,13 @@ def search_alike(
             seen = _figures_of(found)
         return seen
 
-    seen, blunt = seen_until(is_decided), list[Answer]()
+    seen, blunt, other = seen_until(is_decided), list[Answer](), found
     looked = done if is_blunt(seen) else 0
     if looked:
         blunt += search(parts[:looked], Way.BLUNT)
-        if seen.paired_m <= max(length_m(_figures_of(blunt)) / FOUND_AGAIN, SHARP_M):
+        again_m = length_m(_figures_of(blunt))
+        other = blunt if seen.paired_m <= max(again_m / FOUND_AGAIN, SHARP_M) else found
+        if other is blunt and again_m >= SHARP_M:
             yield from blunt
             yield from search(parts[looked:], Way.BLUNT)
             return
@@ -165,4 +167,4 @@ def search_alike(
             yield from blunt
             return
     filled = list(search(parts, Way.FILLED))
-    yield from filled if length_m(_figures_of(filled)) > length_m(seen) + SHARP_M else found
+    yield from filled if length_m(_figures_of(filled)) > length_m(seen) + SHARP_M else other
