@@ -58,8 +58,8 @@ MAX_DRIFT_M = 0.1
 """Largest difference of two levels across a gap: longer gaps are not seen through by gradients alone."""
 
 SHIFTED_M, SHIFT_BINS = 0.05, 24
-"""Largest step between two passes of a scanner, and bins, 12 m, that a level must have to be taken for another pass: a
-road, with a step on either side, may be twice as wide."""
+"""Largest step between two passes of a scanner, or the crown and the face of a head, and bins, 12 m, that a level must
+have to be taken for another pass or view: a road, with a step on either side, may be twice as wide."""
 
 VEHICLE_M = 0.07
 """Height above the rail from which parts of vehicles are: the lowest gauge allows 80 mm."""
@@ -252,7 +252,8 @@ def _chain(pieces: list[np.ndarray], step_m: float) -> np.ndarray:
             off_m[earlier] = _apart(pieces[earlier], pieces[number])
         fits = off_m <= step_m + np.clip(DRIFT * gap_m, 0.0, MAX_DRIFT_M)
         cost = np.where(fits, 0.0, np.where(off_m <= SHIFTED_M, SHIFT_BINS, np.inf))
-        sums = np.where((gap_m > 0) | fits, best[:number] - cost, 0.0)
+        follows = gap_m > -MIN_BINS * LEVEL_BIN_M
+        sums = np.where(follows | fits, best[:number] - cost, 0.0)
         if sums.max() > 0:
             before[number] = int(np.argmax(sums))
             best[number] += sums.max()
