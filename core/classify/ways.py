@@ -82,9 +82,14 @@ def blunt_among(seen: Mapping[int, SearchFigures]) -> frozenset[int]:
 
     There are none unless both kinds show enough rails to be certain: a cloud of one kind is left as it is.
     """
-    if not any(figures.sharp_m >= max(SHARP_M, CLEAR * figures.round_m) for figures in seen.values()):
+    if not any_sharp(seen):
         return frozenset()
     return frozenset(one for one, figures in seen.items() if _is_certainly_blunt(figures))
+
+
+def any_sharp(seen: Mapping[int, SearchFigures]) -> bool:
+    """Return whether a source of a cloud is certainly sharp, by the figures of each that was searched alone."""
+    return any(figures.sharp_m >= max(SHARP_M, CLEAR * figures.round_m) for figures in seen.values())
 
 
 def _is_certainly_blunt(seen: SearchFigures) -> bool:
@@ -92,14 +97,15 @@ def _is_certainly_blunt(seen: SearchFigures) -> bool:
     return _round_m(seen) >= max(BLUNT_M, CLEAR * seen.sharp_m)
 
 
-def blunt_sources(
+def searched_alone(
     parts: Mapping[int, Sequence[Part]],
     search: Callable[[Sequence[tuple[int, Part]]], Iterable[tuple[int, SearchFigures]]],
-) -> frozenset[int]:
-    """Return the blunt sources of a cloud that has sharp ones as well, see `blunt_among`.
+) -> dict[int, SearchFigures]:
+    """Search some parts of a cloud for the rails of each of its sources alone, and return their figures.
 
-    Given are the parts of the cloud in which each source has points, those with most of them first. `search` searches
-    parts for the rails of one source each, as if it were sharp, and yields the source and its figures.
+    Given are the parts in which each source has points, those with most of them first. `search` searches parts for the
+    rails of one source each, as if it were sharp, and yields the source and its figures. A single source is not
+    searched: it is the cloud.
     """
     seen = dict.fromkeys(parts, SearchFigures())
     done, step = 0, 1
@@ -112,7 +118,7 @@ def blunt_sources(
         for one, figures in search(batch):
             seen[one] += figures
         done, step = done + step, done + step
-    return blunt_among(seen)
+    return seen
 
 
 def length_m(seen: SearchFigures) -> float:
@@ -126,12 +132,17 @@ def _figures_of(answers: Iterable[HasFigures]) -> SearchFigures:
 
 
 def search_alike(
-    parts: Sequence[Part], search: Callable[[Sequence[Part], Way], Iterable[Answer]], of_images: bool = False
+    parts: Sequence[Part],
+    search: Callable[[Sequence[Part], Way], Iterable[Answer]],
+    of_images: bool = False,
+    is_sharp: bool = False,
 ) -> Iterator[Answer]:
     """Search all parts of a cloud, those that show most first, in the way that suits it.
 
-    `of_images` says that nothing shows that a scanner measured the points. Heads that hardly stand out of their bed are
-    then searched for as ridges first: those of images have no edges, and what looks like one is a flank.
+    A cloud of which a source is known to be sharp, `is_sharp`, is not blunt, although passes that are apart look round
+    together. Nor do a few metres of ridges show that a cloud is blunt: it may be filled. `of_images` says that nothing
+    shows that a scanner measured the points. Heads that hardly stand out of their bed are then searched for as ridges
+    first: those of images have no edges, and what looks like one is a flank.
     """
     found: list[Answer] = []
     done = 0  # number of parts that were searched; one that failed has no answer
@@ -146,13 +157,13 @@ def search_alike(
             seen = _figures_of(found)
         return seen
 
-    seen, blunt, other = seen_until(is_decided), list[Answer](), found
-    looked = done if is_blunt(seen) else 0
+    seen, blunt, unless_filled = seen_until(is_decided), list[Answer](), found
+    looked = 0 if is_sharp or not is_blunt(seen) else done
     if looked:
         blunt += search(parts[:looked], Way.BLUNT)
         again_m = length_m(_figures_of(blunt))
-        other = blunt if seen.paired_m <= max(again_m / FOUND_AGAIN, SHARP_M) else found
-        if other is blunt and again_m >= SHARP_M:
+        unless_filled = blunt if seen.paired_m <= max(again_m / FOUND_AGAIN, SHARP_M) else found
+        if unless_filled is blunt and again_m >= SHARP_M:
             yield from blunt
             yield from search(parts[looked:], Way.BLUNT)
             return
@@ -167,4 +178,4 @@ def search_alike(
             yield from blunt
             return
     filled = list(search(parts, Way.FILLED))
-    yield from filled if length_m(_figures_of(filled)) > length_m(seen) + SHARP_M else other
+    yield from filled if length_m(_figures_of(filled)) > length_m(seen) + SHARP_M else unless_filled

@@ -16,7 +16,7 @@ from ..classify.guide import MIDDLE_M, Guide
 from ..classify.settings import MARGIN_M, Settings, Way
 from ..classify.square import Classified, classify_square
 from ..classify.tops import LOW_M
-from ..classify.ways import blunt_sources, search_alike
+from ..classify.ways import any_sharp, blunt_among, search_alike, searched_alone
 from ..clouds.passes import sources_of
 from ..clouds.points import Request, read_each
 from ..clouds.readers import CloudHeader, read_points
@@ -96,9 +96,10 @@ class Search:
     def all(self) -> Iterator[Found]:
         """Search all squares: if some of its sources are blunt and others sharp, each kind in its own way."""
         counts, sources = counts_of(self.sorted_files), sources_among(self.sorted_files)
-        blunt = blunt_sources({one: _fullest(own) for one, own in sources.items()}, self._seen)
+        alone = searched_alone({one: _fullest(own) for one, own in sources.items()}, self._seen)
+        blunt = blunt_among(alone)
         if not blunt:
-            yield from search_alike(_fullest(counts), self._alike, self.of_images)
+            yield from search_alike(_fullest(counts), self._alike, self.of_images, any_sharp(alone))
             return
         for way in (Way.SHARP, Way.BLUNT):
             is_blunt = way is Way.BLUNT

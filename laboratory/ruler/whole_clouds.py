@@ -12,7 +12,7 @@ import numpy as np
 
 from ...core.classify.settings import MARGIN_M, Settings, Way
 from ...core.classify.square import Classified
-from ...core.classify.ways import blunt_sources, search_alike
+from ...core.classify.ways import any_sharp, blunt_among, search_alike, searched_alone
 from ...core.grow.heads import GrowSettings, OnHeads, Rail
 from ...core.labelling.finding import search_square
 from ...core.progress import SILENT, Progress
@@ -61,10 +61,11 @@ def classify_cloud(
         keys, square = Tiling(settings.side_m).keys(xyz[which])
         return [keys[place] for place in np.argsort(-np.bincount(square), kind="stable")]
 
-    blunt = blunt_sources({source: fullest(own == source) for source in np.unique(own).tolist()}, seen)
+    alone = searched_alone({source: fullest(own == source) for source in np.unique(own).tolist()}, seen)
+    blunt = blunt_among(alone)
     mixed = bool(blunt)
     every, filling = np.ones(len(xyz), dtype=bool), np.isin(own, sorted(blunt))
-    parts = [search_alike(fullest(every), partial(search, which=every), of_images)]
+    parts = [search_alike(fullest(every), partial(search, which=every), of_images, any_sharp(alone))]
     if mixed:
         parts = [search(fullest(which), way, which) for way, which in ((Way.SHARP, ~filling), (Way.BLUNT, filling))]
     for part in chain(*parts):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from rail_extract.core.classify.settings import Settings, Way
 from rail_extract.core.classify.square import classify_square
-from rail_extract.core.classify.ways import blunt_among, blunt_sources, is_blunt, search_alike
+from rail_extract.core.classify.ways import any_sharp, blunt_among, is_blunt, search_alike, searched_alone
 from rail_extract.core.rails import SearchFigures
 from rail_extract.laboratory.ruler.classification import lines_from, score
 from rail_extract.laboratory.scenes.raw_catalogue import DRONE, RAW_SCENES, double_track
@@ -20,7 +20,7 @@ class Found(NamedTuple):
     figures: SearchFigures
 
 
-def ways(*parts, again=1.0, clear=1.0, of_images=False):
+def ways(*parts, again=1.0, clear=1.0, of_images=False, is_sharp=False):
     """Search parts and return in which way each was searched at last.
 
     They have lengths of sharp, of round, and of filled rails. Of the sharp ones, a share stands clear of the bed; of
@@ -34,7 +34,7 @@ def ways(*parts, again=1.0, clear=1.0, of_images=False):
             filled, blunt = SearchFigures(paired_m=sum(filled_m)), SearchFigures(paired_m=again * round_m)
             yield Found(part, way, {Way.SHARP: seen, Way.FILLED: filled, Way.BLUNT: blunt}[way])
 
-    found = list(search_alike(parts, search, of_images))
+    found = list(search_alike(parts, search, of_images, is_sharp))
     assert [one.part for one in found] == list(parts)
     return [one.way for one in found]
 
@@ -54,6 +54,7 @@ def ways(*parts, again=1.0, clear=1.0, of_images=False):
         ([(0.0, 0.0)] * 7 + [(0.0, 12.0)], Way.BLUNT),
         ([(0.0, 0.0)] * 7 + [(12.0, 3.0)], Way.SHARP),
         ([(0.0, 0.0)] * 7 + [(12.0, 3.0, 80.0)], Way.FILLED),
+        ([(0.0, 0.0, 80.0)] * 3 + [(0.0, 1.7, 80.0)], Way.FILLED),
         ([(0.0, 0.0, 80.0)] * 7 + [(30.0, 3.0, 80.0)], Way.SHARP),
         ([], Way.SHARP),
     ],
@@ -204,6 +205,15 @@ def test_heads_just_above_the_ballast_are_seen_under_the_vault_of_a_tunnel():
     assert searched(tunnel, Way.FILLED).filled_m == pytest.approx(2 * 16.0, abs=3.0)
 
 
+def test_points_on_heads_just_above_the_ballast_are_in_the_middle_of_these():
+    """In world 12035, the lines of cells were 30 mm aside, and lines were 16 mm off their heads."""
+    track = filled_track(0.02, 1500, rough_m=0.01)
+    on_heads = track[classify_square(track, Settings((1.435,), 0.072, way=Way.FILLED)).rail]
+    off_m = np.abs(on_heads[:, 0] - 7.0) - 0.5 * (1.435 + 0.072)
+    assert np.median(off_m) == pytest.approx(0.0, abs=0.003)
+    assert np.quantile(np.abs(off_m), 0.95) < 0.040
+
+
 SHARP, ROUND, NOTHING = (30.0, 2.0), (0.5, 60.0), (0.0, 0.0)
 """Lengths of sharp and of round rails in a part of a cloud."""
 
@@ -226,8 +236,16 @@ def test_sources_are_blunt_among_sharp_ones_only_if_both_are_certain(sources, bl
         asked.extend(parts)
         return [(one, SearchFigures(sharp_m=sharp_m, round_m=round_m)) for one, (sharp_m, round_m) in parts]
 
-    assert blunt_sources(sources, search) == blunt
+    assert blunt_among(searched_alone(sources, search)) == blunt
     assert len(asked) == searched
+
+
+def test_passes_that_are_apart_are_sharp_although_they_look_round_together():
+    """In world 12589, two passes 4 cm apart were searched as a blunt cloud, and no line was drawn."""
+    assert any_sharp({1: SearchFigures(sharp_m=50.0, round_m=4.0), 2: SearchFigures(sharp_m=12.0)})
+    assert not any_sharp({1: SearchFigures(sharp_m=50.0, round_m=40.0), 2: SearchFigures(sharp_m=12.0)})
+    assert ways(*[(0.0, 50.0)] * 4) == [Way.BLUNT] * 4
+    assert ways(*[(0.0, 50.0)] * 4, is_sharp=True) == [Way.SHARP] * 4
 
 
 def test_passes_of_one_wide_beam_are_of_one_kind():

@@ -63,6 +63,13 @@ def test_a_rail_whose_level_drifts_is_not_a_vehicle_where_noise_breaks_it_into_p
     assert rail.mean() > 0.9
 
 
+@pytest.mark.parametrize("lower_m", [0.022, 0.03])
+def test_a_level_may_follow_another_one_although_both_are_seen_where_they_meet(lower_m):
+    """A tripod shows the crown of a head, and the next one its face (world 12423: 20 mm lower)."""
+    parts = own(band(0, 51, profile=hilly), band(50, 90, up=-lower_m, seed=1, profile=hilly))
+    assert min(part.mean() for part in parts) > 0.98
+
+
 def test_few_points_on_a_face_have_no_level():
     """A far scanner sees some points of a crown, and most of a face that is 38 mm high."""
     random = np.random.default_rng(1)
