@@ -105,6 +105,8 @@ SWITCHES = (
     _rule("classify.partner._majority", first),
     _rule("classify.labels.MIN_AXES", 1),
     _rule("classify.blunt._on_heads", lambda kept, crests, *_: replace(kept, lines=crests)),
+    _rule("classify.low._on_heads", lambda shown, lines, *_: lines),
+    _rule("labelling.finding.any_sharp", lambda seen: False),
     _rule("classify.tops._around", first),
     _rule("classify.tops.SHADOWED_SHARE", 0.5),
     _rule("clouds.on_heads.BELOW_SHARE", 1.0),

@@ -94,11 +94,11 @@ def on_low(shown: Shown, settings: Settings) -> Standing:
     kept = kept.of(with_partner(kept.pairs, kept.paired))
     if len(kept.cell):
         piece = pieces_of(len(kept.cell), kept.pairs)
-        of_heads = shown.height < HIGHEST_M
-        width_m = Ridges.measure(shown.xy[of_heads], shown.height[of_heads], kept.lines, piece).width_m
+        of_heads = shown.of(shown.height < HIGHEST_M)
+        width_m = Ridges.measure(of_heads.xy, of_heads.height, kept.lines, piece).width_m
         too_wide = width_m >= settings.head_width_m + tolerances.wider_m  # where one side is hidden, this is not known
         kept = fitting(kept, piece, ~too_wide, settings, tolerances)
-        kept = replace(kept, lines=_on_heads(shown.of(of_heads), kept.lines, settings.head_width_m))
+        kept = replace(kept, lines=_on_heads(of_heads, kept.lines, settings.head_width_m))
     cells = cells_beside(grid, kept.lines, (settings.head_width_m - grid.cell_m) / 2)
     chosen = label(shown.tops, cells, shown.cell, shown.height, tolerances)
     beside = Near.find(shown.xy[chosen], kept.lines)

@@ -28,7 +28,7 @@ BIN_M = 0.01
 
 BINS = 2 * round(REACH_M / BIN_M)
 
-ACROSS_M = (np.arange(BINS) - BINS / 2 + 0.5) * BIN_M
+MIDDLES_M = (np.arange(BINS) - BINS / 2 + 0.5) * BIN_M
 """Middles of the bins, from the axis to the left."""
 
 BASE_M = 0.20
@@ -129,7 +129,7 @@ def on_crests(xy: np.ndarray, height: np.ndarray, lines: Lines, blur_m: float, r
     across = to_one_side(lines, pieces_of(len(own), pairs))
     count, rise = _profiles(xy, height, lines, across, own)
     same = _along(own, pairs)
-    beyond = np.abs(ACROSS_M) > reach_m
+    beyond = np.abs(MIDDLES_M) > reach_m
     count, rise = same @ count, same @ rise
     count[:, beyond] = rise[:, beyond] = 0.0
     fits = np.array([_explained(count, rise, crest_m, blur_m) for crest_m in CRESTS_M])
@@ -148,7 +148,7 @@ def sides_of(level: np.ndarray, grid: Grid, lines: Lines) -> tuple[np.ndarray, n
     """
     rise, seen = np.zeros((2, len(lines.axis), BINS))
     for ahead_m in SIDES_M:
-        for number, across_m in enumerate(ACROSS_M.tolist()):
+        for number, across_m in enumerate(MIDDLES_M.tolist()):
             cell, inside = grid.cells(lines.axis + ahead_m * lines.along + across_m * lines.across)
             up = level.ravel()[cell] - lines.height
             known = inside & np.isfinite(up)
@@ -198,7 +198,7 @@ def _explained(count: np.ndarray, rise: np.ndarray, crest_m: float, blur_m: floa
     `count` and `rise`, (k, BINS), are the points by bin and the sum of their heights; `blur_m` is the standard
     deviation of the ridge.
     """
-    model = np.stack([np.ones(BINS), ACROSS_M / REACH_M, np.exp(-0.5 * ((ACROSS_M - crest_m) / blur_m) ** 2)])
+    model = np.stack([np.ones(BINS), MIDDLES_M / REACH_M, np.exp(-0.5 * ((MIDDLES_M - crest_m) / blur_m) ** 2)])
     normal = np.einsum("kb,ib,jb->kij", count, model, model) + LEAST_POINTS * np.eye(len(model))
     right = rise @ model.T
     return np.einsum("ki,ki->k", right, np.linalg.solve(normal, right[:, :, None])[:, :, 0])

@@ -162,11 +162,12 @@ def search_alike(
     if looked:
         blunt += search(parts[:looked], Way.BLUNT)
         again_m = length_m(_figures_of(blunt))
-        unless_filled = blunt if seen.paired_m <= max(again_m / FOUND_AGAIN, SHARP_M) else found
-        if unless_filled is blunt and again_m >= SHARP_M:
+        shows_ridges = seen.paired_m <= max(again_m / FOUND_AGAIN, SHARP_M)
+        if shows_ridges and again_m >= SHARP_M:
             yield from blunt
             yield from search(parts[looked:], Way.BLUNT)
             return
+        unless_filled = blunt if shows_ridges else found
     seen = seen_until(shows_clear)
     if shows_clear(seen):
         yield from found
