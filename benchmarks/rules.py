@@ -12,7 +12,7 @@ from typing import Any
 from unittest.mock import patch
 
 import numpy as np
-from rail_extract.core.classify.flush import NO_LINES, Flush
+from rail_extract.core.classify.flush import NO_FLUSH
 from rail_extract.core.polyline import Polyline
 
 
@@ -96,7 +96,7 @@ SWITCHES = (
     _rule("classify.cells.are_certain", all_paired, ("classify.bars", "are_certain", all_paired)),
     _rule("classify.labels._highest_around", lambda image, cells, reach: np.full(len(cells), -(10**6))),
     _rule("classify.labels.UNDER_MEAN_M", 10.0),
-    _rule("classify.square.flush_rails", lambda *_: Flush(np.empty(0, dtype=np.int64), NO_LINES, NO_LINES)),
+    _rule("classify.square.flush_rails", lambda *_: NO_FLUSH),
     _rule("classify.bars.SINGLE_SLOPE", np.inf),
     _rule("classify.bars.SINGLE_FALL", np.inf),
     _rule("classify.bars.SINGLE_DEPTH", -np.inf),

@@ -9,10 +9,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.ndimage import binary_dilation, binary_propagation
-from scipy.sparse import csr_matrix
 from scipy.spatial import cKDTree
 
+from ..spread import sigma_by_median
 from .bed import COARSE_M, MAX_LEVELS
+from .gaps import BESIDE_LINE_M, STOREY_M, outer_edges, summed_along, thinned
 from .lines import Lines, Marks, find_lines
 from .partner import partners
 from .pieces import lengths, links, pieces_of
@@ -28,10 +29,11 @@ MIN_SHARE, LEVEL_M, NEAR_BED_M = 0.65, 0.008, 0.03
 """A coarse cell is paved if this share of its points is this close to their mean height; the mean is that of the
 points near the bed. Ballast scatters by 12 mm and more."""
 
-CAVITY_M = (0.012, 0.19)
-"""Depth of points in a groove below the pavement: from three times a good scanner's noise to a rail's height."""
+CAVITY_M, CAVITY_SIGMAS = (0.012, 0.19), 2.5
+"""Depth of points in a groove below the pavement: from three times a good scanner's noise to a rail's height; and least
+depth in standard deviations of the points about their pavement: noise of 7 mm would hollow out all of it."""
 
-REACH_M, BESIDE_LINE_M, MIN_COVER, MIN_PURE = 1.0, 0.05, 0.5, 0.3
+REACH_M, MIN_COVER, MIN_PURE = 1.0, 0.5, 0.3
 """See `lines`; stricter than for rails, because nothing else confirms a groove."""
 
 INSIDE_M, SPACING_M = 0.052, 0.05
@@ -40,30 +42,8 @@ INSIDE_M, SPACING_M = 0.052, 0.05
 MIN_STATIONS = 3
 """Stations with a partner of five."""
 
-STOREY_M = 0.3
-"""Difference in height up to which places belong to one pavement: a wall of a groove, cant and gradient over a metre
-take less, and floors, decks and ceilings are 0.6 m and more apart."""
-
 MIN_LENGTH_M = 2.0
 """Shortest groove."""
-
-ALONG_M = 0.6
-"""Length to either side over which the points of slices are added up."""
-
-SLICE_M = 0.05
-"""Length of the slice of level points that each cell of a groove looks at, to either side."""
-
-BIN_M, BINS = 0.004, 56
-"""Bins across in which the level points of a slice are counted: 112 mm to either side, a wide groove and a head."""
-
-LEVEL_QUANTILE, GAP_SHARE = 0.6, 0.35
-"""Quantile over the bins that stands for what is level, because grooves and gaps fill less than half of them; and share
-of it below which a bin is part of the gap: near the edge of a head that hides its own corner half of the points are
-left."""
-
-SEARCH_BINS = 6
-"""Distance from the middle of the cavities within which the gap is looked for: where only one wall is seen, the middle
-is on it."""
 
 HEAD_LEVEL_M = 0.012
 """Largest difference in height between a head and the pavement."""
@@ -76,20 +56,24 @@ BESIDE_M = 0.003
 
 NO_LINES = Lines(np.empty((0, 2)), np.empty(0), np.empty(0), np.empty(0), np.empty(0), REACH_M)
 
+NO_POINTS = np.empty(0, dtype=np.int64)
+
 
 @dataclass(frozen=True)
 class Flush:
     """Rails in pavement: the numbers of the `points` on heads, (k,), and the `lines` along these.
 
-    `rails` are those that the guide leaves out as well.
+    `rails` are those that the guide leaves out as well. `paved` are the numbers of all points of pavements in which
+    rails are found, (p,).
     """
 
     points: np.ndarray
     lines: Lines
     rails: Lines
+    paved: np.ndarray
 
 
-NO_FLUSH = Flush(np.empty(0, dtype=np.int64), NO_LINES, NO_LINES)
+NO_FLUSH = Flush(NO_POINTS, NO_LINES, NO_LINES, NO_POINTS)
 
 
 @dataclass(frozen=True)
@@ -110,7 +94,8 @@ def flush_rails(shape: tuple[int, int], near: NearBed, grid: Grid, cell: np.ndar
     if not np.isfinite(below).any():
         return NO_FLUSH
     places = np.column_stack([xy, near.z])
-    hollow = np.flatnonzero((below > CAVITY_M[0]) & (below < CAVITY_M[1]))
+    noise_m = sigma_by_median(below[np.abs(below) < NEAR_BED_M])
+    hollow = np.flatnonzero((below > max(CAVITY_M[0], CAVITY_SIGMAS * noise_m)) & (below < CAVITY_M[1]))
     marks = _marks(places[hollow], near.level[hollow], cell[hollow])
     if len(marks.xy) < 2:
         return NO_FLUSH
@@ -123,7 +108,8 @@ def flush_rails(shape: tuple[int, int], near: NearBed, grid: Grid, cell: np.ndar
     upper = np.flatnonzero((below > -HEAD_LEVEL_M) & (below < FACE_M))
     points = [upper[_on_heads(one, places[upper], below[upper], head_width_m)] for one in heads]
     most = int(np.argmax([len(one.inward) for one in rails]))
-    return Flush(np.unique(np.concatenate(points)), heads[most].lines, rails[most].lines)
+    in_street = np.flatnonzero(paved) if len(rails[most].inward) else NO_POINTS
+    return Flush(np.unique(np.concatenate(points)), heads[most].lines, rails[most].lines, in_street)
 
 
 def _marks(places: np.ndarray, level: np.ndarray, cell: np.ndarray) -> Marks:
@@ -196,64 +182,11 @@ def _at_edge(grooves: Heads, xyz: np.ndarray, flat: np.ndarray, head_width_m: fl
     """
     if not len(grooves.inward) or not flat.any():
         return grooves.of(np.zeros(len(grooves.inward), dtype=bool))
-    level, every = (_summed_along(grooves, counts) for counts in _counts(grooves, xyz, flat))
-    edge_m = _outer_edges(level, every, head_width_m)
+    grooves = grooves.of(thinned(grooves.lines))
+    level, every = summed_along(grooves.lines, grooves.inward, xyz, flat)
+    edge_m = outer_edges(level, every, head_width_m)
     seen = np.isfinite(edge_m)
     return grooves.of(seen).moved(edge_m[seen] - head_width_m / 2)
-
-
-def _counts(grooves: Heads, xyz: np.ndarray, flat: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Count the points, (k, 3), of the same pavement by distance inwards from each cell of a groove, (n, BINS) each.
-
-    Those that are level, `flat`, (k,) bool, come first, and then all of them.
-    """
-    axis, inward = grooves.lines.axis, grooves.inward
-    reach_m = np.hypot(BIN_M * BINS / 2, SLICE_M)
-    near = cKDTree(axis).sparse_distance_matrix(cKDTree(xyz[:, :2]), reach_m, output_type="ndarray")
-    own, other = near["i"], near["j"]
-    same = np.abs(xyz[other, 2] - grooves.lines.height[own]) < STOREY_M
-    own, other = own[same], other[same]
-    step = xyz[other, :2] - axis[own]
-    bins = np.floor(np.einsum("ij,ij->i", step, inward[own]) / BIN_M).astype(np.int64) + BINS // 2
-    inside = np.abs(np.einsum("ij,ij->i", step, grooves.lines.along[own])) < SLICE_M
-    inside &= (bins >= 0) & (bins < BINS)
-    number, size = own * BINS + bins, len(axis) * BINS
-    level, every = (
-        np.bincount(number[chosen], minlength=size).reshape(-1, BINS) for chosen in (inside & flat[other], inside)
-    )
-    return level, every
-
-
-def _summed_along(grooves: Heads, counts: np.ndarray) -> np.ndarray:
-    """Add up the counts of the cells of the same groove within `ALONG_M`, (n, BINS)."""
-    axis, inward = grooves.lines.axis, grooves.inward
-    one, other = cKDTree(axis).query_pairs(ALONG_M, output_type="ndarray").T
-    same = np.abs(np.einsum("ij,ij->i", axis[other] - axis[one], inward[one])) < BESIDE_LINE_M
-    same &= np.abs(grooves.lines.height[other] - grooves.lines.height[one]) < STOREY_M
-    same &= np.einsum("ij,ij->i", inward[one], inward[other]) > 0
-    own = np.arange(len(axis))
-    rows, columns = np.concatenate([own, one[same], other[same]]), np.concatenate([own, other[same], one[same]])
-    return csr_matrix((np.ones(len(rows)), (rows, columns)), shape=(len(axis), len(axis))) @ counts
-
-
-def _outer_edges(counts: np.ndarray, every: np.ndarray, head_width_m: float) -> np.ndarray:
-    """Distance inwards at which the gap that is nearest to the middle begins, (n,) metres; NaN where there is none.
-
-    Given are the level points and all points in each bin, (n, BINS). Nor is there one where less than half of a head
-    beside it is level, by most of its points: at the foot of a wall, or of a slope.
-    """
-    limit = GAP_SHARE * np.quantile(counts, LEVEL_QUANTILE, axis=1)[:, None]
-    level, number, middle = counts >= np.maximum(limit, 1), np.arange(BINS), BINS // 2
-    far = np.where(level, BINS, np.abs(number - middle))
-    gap = np.argmin(far, axis=1)
-    head = np.max(np.where(level & (number < gap[:, None]), number, -1), axis=1)
-    rows = np.arange(len(counts))
-    on_head = (number <= head[:, None]) & (number > head[:, None] - head_width_m / BIN_M)
-    flat = on_head & level & (2 * counts > every)
-    found = (far[rows, gap] <= SEARCH_BINS) & (2 * flat.sum(axis=1) > on_head.sum(axis=1))
-    high, low = counts[rows, head], counts[rows, np.minimum(head + 1, BINS - 1)]
-    share = (high - limit[:, 0]) / np.maximum(high - low, 1)
-    return np.where(found, (head - middle + 0.5 + share) * BIN_M, np.nan)
 
 
 def _on_heads(heads: Heads, xyz: np.ndarray, below_m: np.ndarray, head_width_m: float) -> np.ndarray:

@@ -65,9 +65,9 @@ def classify_square(xyz: np.ndarray, settings: Settings) -> ByShape:
     height, xy = height[near], xyz[near, :2]
     grid, cell = Grid.around(xy[:, 0], xy[:, 1], settings.cell_m)
     tops = tops_of(grid, cell, height, z[near])
-    standing = _standing(Shown(xy, cell, height, bed, tops), level[near], settings)
     near_bed = NearBed(xy, z[near], height, bed.coarse.cell[near], level[near])
     paved = NO_FLUSH if settings.blunt else flush_rails(bed.coarse.shape, near_bed, grid, cell, settings)
+    standing = _standing(Shown(xy, cell, height, bed, tops), level[near], paved, settings)
     in_pavement = rail.copy()
     in_pavement[near[paved.points]] = True
     found = np.append(near[standing.points], near[paved.points])
@@ -97,7 +97,7 @@ def _on_vault(bed: Bed, height: np.ndarray, level: np.ndarray) -> np.ndarray:
     return on_vault
 
 
-def _standing(shown: Shown, level: np.ndarray, settings: Settings) -> Standing:
+def _standing(shown: Shown, level: np.ndarray, paved: Flush, settings: Settings) -> Standing:
     """Find rails that stand out of their bed, and in a cloud with filled tracks also those that hardly do."""
     if settings.way is not Way.FILLED:
         return _clear(shown, settings)
@@ -106,6 +106,7 @@ def _standing(shown: Shown, level: np.ndarray, settings: Settings) -> Standing:
     if dense_m2 < LEAST_DENSE_M2:
         return clear
     ground = level == 0  # the vault of a tunnel is as rough as ballast
+    ground[paved.paved] = False  # in a street, no head stands out
     low = on_low(shown.of(ground), settings)
     return clear.with_others(replace(low, points=np.flatnonzero(ground)[low.points]), settings.head_width_m)
 

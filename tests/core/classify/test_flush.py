@@ -1,6 +1,8 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from rail_extract.core.classify.settings import Settings
+from rail_extract.core.classify.settings import Settings, Way
 from rail_extract.core.classify.square import classify_square
 from rail_extract.laboratory.scenes.raw_shapes import MIDDLE, flat, turned
 
@@ -44,6 +46,27 @@ def test_noise_hides_the_grooves():
     found = classify_square(xyz, SETTINGS)
     assert not found.rail.any()
     assert found.figures.paved == 0
+
+
+def test_grooves_are_found_in_a_pavement_as_rough_as_the_noise_of_a_train_scanner():
+    """At 7 mm, one point in twenty of the pavement is as low as a groove that a good scanner sees begins."""
+    xyz, on, _ = street(0.007)
+    found = classify_square(xyz, SETTINGS)
+    here = np.abs(turned(xyz, 0.3)[0]) < 3
+    assert (found.rail & on & here).sum() / (on & here).sum() > 0.85
+    assert (found.rail & on).sum() / found.rail.sum() > 0.9
+
+
+def test_a_street_is_not_searched_for_heads_just_above_ballast():
+    """Two strips at gauge across the street stand out of it by 9 mm, as profiles of a pass that is registered higher."""
+    xyz, on, _ = street(0.001)
+    across = turned(xyz, 0.3 + np.pi / 2)[1]
+    strips = np.abs(np.abs(across) - (GAUGE + WIDTH) / 2) < WIDTH / 2
+    xyz[strips, 2] += 0.009
+    found = classify_square(xyz, replace(SETTINGS, way=Way.FILLED))
+    assert (found.rail & on).sum() > 1000
+    assert found.figures.filled_m == 0
+    assert (found.rail & ~on).sum() < 0.01 * found.rail.sum()
 
 
 def test_grooves_at_another_distance_are_not_rails():
