@@ -13,10 +13,11 @@ from scipy.spatial import cKDTree
 
 from ..spread import sigma_by_median
 from .bed import COARSE_M, MAX_LEVELS
-from .gaps import BESIDE_LINE_M, STOREY_M, outer_edges, summed_along, thinned
+from .gaps import STOREY_M, outer_edges, summed_along, thinned
 from .lines import Lines, Marks, find_lines
 from .partner import partners
 from .pieces import lengths, links, pieces_of
+from .ridges import steadied
 from .settings import Settings
 from .tops import TENTHS_OF_MM, Grid, centroids
 
@@ -33,7 +34,7 @@ CAVITY_M, CAVITY_SIGMAS = (0.012, 0.19), 2.5
 """Depth of points in a groove below the pavement: from three times a good scanner's noise to a rail's height; and least
 depth in standard deviations of the points about their pavement: noise of 7 mm would hollow out all of it."""
 
-REACH_M, MIN_COVER, MIN_PURE = 1.0, 0.5, 0.3
+REACH_M, BESIDE_LINE_M, MIN_COVER, MIN_PURE = 1.0, 0.05, 0.5, 0.3
 """See `lines`; stricter than for rails, because nothing else confirms a groove."""
 
 INSIDE_M, SPACING_M = 0.052, 0.05
@@ -182,7 +183,7 @@ def _at_edge(grooves: Heads, xyz: np.ndarray, flat: np.ndarray, head_width_m: fl
     """
     if not len(grooves.inward) or not flat.any():
         return grooves.of(np.zeros(len(grooves.inward), dtype=bool))
-    grooves = grooves.of(thinned(grooves.lines))
+    grooves = replace(grooves, lines=steadied(grooves.lines)).of(thinned(grooves.lines))
     level, every = summed_along(grooves.lines, grooves.inward, xyz, flat)
     edge_m = outer_edges(level, every, head_width_m)
     seen = np.isfinite(edge_m)

@@ -14,8 +14,9 @@ from scipy.spatial import cKDTree
 
 from .lines import Lines
 
-BESIDE_LINE_M = 0.05
-"""Largest distance across of two cells of the same groove, which may have a row of them on either wall."""
+ROW_M = 0.015
+"""Largest distance across of two cells of the same row, of which a groove may have one on either wall: an arc of 25 m
+bends by 7 mm over 0.6 m."""
 
 STOREY_M = 0.3
 """Difference in height up to which places belong to one pavement: a wall of a groove, cant and gradient over a metre
@@ -61,11 +62,11 @@ def thinned(lines: Lines) -> np.ndarray:
 def summed_along(lines: Lines, inward: np.ndarray, xyz: np.ndarray, flat: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Count the points, (k, 3), by distance from thinned cells in their direction `inward`, (n, BINS) each.
 
-    Those that are level, `flat`, (k,) bool, come first, and then all of them. They are of the same groove and within
+    Those that are level, `flat`, (k,) bool, come first, and then all of them. They are those of the same row within
     `ALONG_M`, or further where points are few.
     """
     level, every = _counts(lines, inward, xyz, flat)
-    reach = _same_groove(lines, inward)
+    reach = _same_row(lines, inward)
     level_sum, every_sum = reach @ level, reach @ every
     for _ in range(DOUBLINGS):
         few = np.quantile(level_sum, LEVEL_QUANTILE, axis=1) < ENOUGH
@@ -98,11 +99,11 @@ def _counts(lines: Lines, inward: np.ndarray, xyz: np.ndarray, flat: np.ndarray)
     return level, every
 
 
-def _same_groove(lines: Lines, inward: np.ndarray) -> csr_matrix:
-    """Which cells are of the same groove as each cell and within `ALONG_M` of it, and the cell itself, (n, n)."""
+def _same_row(lines: Lines, inward: np.ndarray) -> csr_matrix:
+    """Which cells are of the same row as each cell and within `ALONG_M` of it, and the cell itself, (n, n)."""
     axis, own = lines.axis, np.arange(len(lines.axis))
     one, other = cKDTree(axis).query_pairs(ALONG_M, output_type="ndarray").T
-    same = np.abs(np.einsum("ij,ij->i", axis[other] - axis[one], inward[one])) < BESIDE_LINE_M
+    same = np.abs(np.einsum("ij,ij->i", axis[other] - axis[one], inward[one])) < ROW_M
     same &= np.abs(lines.height[other] - lines.height[one]) < STOREY_M
     same &= np.einsum("ij,ij->i", inward[one], inward[other]) > 0
     rows, columns = np.concatenate([own, one[same], other[same]]), np.concatenate([own, other[same], one[same]])
