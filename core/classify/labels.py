@@ -39,11 +39,6 @@ up to 1.7 times as large as that of points everywhere on a head; these shares ar
 now one face is seen and now the other, and the axis follows. Measured by tripods: 17 mm wider than a head at most, and
 28 mm by scatter over whole pieces; kerbs of 150 mm 62 mm, and 52 mm by scatter."""
 
-USUAL_SHARE = 0.3
-"""Share of the points of a piece that are in its narrowest sections, whose width is that of the piece: next to a blade,
-two heads are one bar over 5 m, which is most of a piece that ends where they touch and at the edge of its square. Other
-wide things are wide all along."""
-
 
 def whole_heads(tops: Tops, kept: np.ndarray, tolerances: Tolerances) -> np.ndarray:
     """Spread kept cells, one of each block of 2 x 2, over the others of their blocks, and drop feet and fastenings.
@@ -141,7 +136,7 @@ class Near:
         """Width of the top of each piece, (pieces,) metres; 0 without points.
 
         `lines` are those of the cells, on `piece`, (cells,). The width of a section is that of a bar on which points
-        are everywhere alike, and that of a piece is exceeded on most of its points, see `USUAL_SHARE`.
+        are everywhere alike, and that of a piece the median over its points.
         """
         inside = np.abs(self.across) < WIDEST_M
         cell, number = self.cell[inside], _sections(lines, piece)
@@ -149,8 +144,8 @@ class Near:
         section, across = number[cell], left[cell] * self.across[inside]
         low, high = (_quantiles(across, section, share) for share in (BEYOND_SHARE, 1 - BEYOND_SHARE))
         width_m = (high - low) / (1 - 2 * BEYOND_SHARE)
-        usual = _quantiles(width_m[section], piece[cell], USUAL_SHARE)
-        return np.append(usual, np.zeros(int(piece.max(initial=-1)) + 1 - len(usual)))
+        median = _quantiles(width_m[section], piece[cell], 0.5)
+        return np.append(median, np.zeros(int(piece.max(initial=-1)) + 1 - len(median)))
 
 
 def _sections(lines: Lines, piece: np.ndarray) -> np.ndarray:
