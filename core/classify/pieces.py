@@ -40,6 +40,10 @@ ACROSS_M = (0.09, 0.13, 0.17, 0.21, 0.25, 0.29)
 ALONG = 9
 """Places along the line, over half its reach to either side."""
 
+SHOWN_SHARE = 0.1
+"""Least share of the places of one side that are seen, by those of the other side at the same distance, from which they
+count: beams that meet the edge of a head and what is behind it show up to a tenth as many points in its shadow."""
+
 MAX_HIGH = 4
 """Of these distances, as many may be as high as the line on one side. A guard rail takes three; the edge of a kerb, of
 a cable trough, or of the shoulder of the ballast takes all."""
@@ -168,7 +172,8 @@ def stands_free(
     alone sees one place of what is beside it, or none.
     """
     seen, high = (_with_continued(counts, lines, pairs) for counts in _seen_beside(tops, depth_m, marks, lines, slope))
-    return ((2 * high > seen).sum(axis=2) <= MAX_HIGH).all(axis=1)
+    shown = seen >= SHOWN_SHARE * seen.max(axis=1, keepdims=True)
+    return ((shown & (2 * high > seen)).sum(axis=2) <= MAX_HIGH).all(axis=1)
 
 
 def _seen_beside(

@@ -58,7 +58,7 @@ def test_grooves_are_found_in_a_pavement_as_rough_as_the_noise_of_a_train_scanne
 
 
 def test_a_street_is_not_searched_for_heads_just_above_ballast():
-    """Two strips at gauge across the street stand out of it by 9 mm, as profiles of a pass that is registered higher."""
+    """Two strips at gauge across the street stand out by 9 mm, as profiles of a pass that is registered higher."""
     xyz, on, _ = street(0.001)
     across = turned(xyz, 0.3 + np.pi / 2)[1]
     strips = np.abs(np.abs(across) - (GAUGE + WIDTH) / 2) < WIDTH / 2

@@ -69,6 +69,21 @@ def test_rails_are_labelled_where_little_of_a_viaduct_and_some_ground_below_is_s
     assert (found & on)[inner(xyz, 10)].sum() / on[inner(xyz, 10)].sum() > 0.9
 
 
+def test_rails_are_labelled_where_beams_that_meet_their_edges_leave_points_in_their_shadows():
+    """As high as the heads, and in a twentieth of the cells; world 12543 lost the blades of a slip by them."""
+    rng = np.random.RandomState(5)
+    xyz, on = with_track(flat(12.0, rng=rng, per_m2=6000), GAUGE, WIDTH)
+    xyz, left = rough(xyz, rng), turned(xyz, 0.0)[1]
+    beyond = np.array([side * SPACING / 2 - WIDTH / 2 - left for side in (1, -1)])
+    shadow = ((beyond > 0) & (beyond < 0.4)).any(axis=0)
+    mixed = shadow & (rng.random_sample(len(xyz)) < 0.01)
+    xyz[mixed, 2] = TOP_M - rng.uniform(0.0, 0.06, mixed.sum())
+    seen = ~shadow | mixed
+    found = classify_square(xyz[seen], SETTINGS).rail
+    assert found[on[seen] & inner(xyz[seen], 10)].mean() > 0.99
+    assert (found & on[seen]).sum() / found.sum() > 0.99
+
+
 def test_the_edge_of_a_trough_of_whose_top_little_is_seen_is_no_rail():
     """A far scanner sees its face, and on its top a point here and there: each cell sees none or one of them."""
     rng = np.random.RandomState(22)
