@@ -8,15 +8,15 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.ndimage import binary_dilation, binary_propagation
+from scipy.ndimage import binary_dilation, binary_propagation, median
 from scipy.spatial import cKDTree
 
 from ..spread import sigma_by_median
 from .bed import COARSE_M, MAX_LEVELS
 from .gaps import STOREY_M, outer_edges, summed_along, thinned
-from .lines import Lines, Marks, find_lines
+from .lines import Lines, Marks, find_lines, joined
 from .partner import partners
-from .pieces import lengths, links, pieces_of
+from .pieces import lengths, links, mean_of, pieces_of, to_one_side
 from .ridges import steadied
 from .settings import Settings
 from .tops import TENTHS_OF_MM, Grid, centroids
@@ -44,7 +44,11 @@ MIN_STATIONS = 3
 """Stations with a partner of five."""
 
 MIN_LENGTH_M = 2.0
-"""Shortest groove."""
+"""Shortest groove that has its partner."""
+
+OTHER_ROW_M = 0.3
+"""Distance from cells with a partner within which those without one are of another row of the same groove, or of the
+gap on the outer side of the head."""
 
 HEAD_LEVEL_M = 0.012
 """Largest difference in height between a head and the pavement."""
@@ -55,6 +59,9 @@ FACE_M, CORNER_M = 0.035, 0.013
 BESIDE_M = 0.003
 """Distance beyond the edge within which a point on the side of the groove is still rail: noise across."""
 
+STREET_M = 4.0
+"""Width of a street beside a rail in it: to the next track, or a lane for road vehicles."""
+
 NO_LINES = Lines(np.empty((0, 2)), np.empty(0), np.empty(0), np.empty(0), np.empty(0), REACH_M)
 
 NO_POINTS = np.empty(0, dtype=np.int64)
@@ -64,14 +71,24 @@ NO_POINTS = np.empty(0, dtype=np.int64)
 class Flush:
     """Rails in pavement: the numbers of the `points` on heads, (k,), and the `lines` along these.
 
-    `rails` are those that the guide leaves out as well. `paved` are the numbers of all points of pavements in which
-    rails are found, (p,).
+    `rails` are those that the guide leaves out as well, and `paved` the numbers of all points of pavements, (p,).
     """
 
     points: np.ndarray
     lines: Lines
     rails: Lines
     paved: np.ndarray
+
+    def street(self, xy: np.ndarray) -> np.ndarray:
+        """Return the numbers of the points of pavement beside rails in it, (k,), given the places of all, (n, 2)."""
+        if not len(self.rails.axis):
+            return NO_POINTS
+        paved = xy[self.paved]
+        distance, cell = cKDTree(self.rails.axis).query(paved, distance_upper_bound=STREET_M)
+        near = np.flatnonzero(np.isfinite(distance))
+        step = paved[near] - self.rails.axis[cell[near]]
+        beside = np.abs(np.einsum("ij,ij->i", step, self.rails.along[cell[near]])) < COARSE_M
+        return self.paved[near[beside]]
 
 
 NO_FLUSH = Flush(NO_POINTS, NO_LINES, NO_LINES, NO_POINTS)
@@ -109,8 +126,7 @@ def flush_rails(shape: tuple[int, int], near: NearBed, grid: Grid, cell: np.ndar
     upper = np.flatnonzero((below > -HEAD_LEVEL_M) & (below < FACE_M))
     points = [upper[_on_heads(one, places[upper], below[upper], head_width_m)] for one in heads]
     most = int(np.argmax([len(one.inward) for one in rails]))
-    in_street = np.flatnonzero(paved) if len(rails[most].inward) else NO_POINTS
-    return Flush(np.unique(np.concatenate(points)), heads[most].lines, rails[most].lines, in_street)
+    return Flush(np.unique(np.concatenate(points)), heads[most].lines, rails[most].lines, np.flatnonzero(paved))
 
 
 def _marks(places: np.ndarray, level: np.ndarray, cell: np.ndarray) -> Marks:
@@ -158,6 +174,14 @@ class Heads:
         """Choose some of the cells."""
         return Heads(self.lines.of(chosen), self.inward[chosen])
 
+    def with_others(self, others: Heads) -> Heads:
+        """Add further cells."""
+        return Heads(joined(self.lines, others.lines), np.concatenate([self.inward, others.inward]))
+
+    def opposite(self, apart_m: np.ndarray) -> Heads:
+        """Return the cells opposite of these, (n,) metres away."""
+        return replace(self.moved(apart_m), inward=-self.inward)
+
     def moved(self, inward_m: np.ndarray) -> Heads:
         """Move the axes towards the other rail, (n,) metres."""
         axis = self.lines.axis + inward_m[:, None] * self.inward
@@ -165,14 +189,35 @@ class Heads:
 
 
 def _grooves(lines: Lines, gauge_m: float) -> Heads:
-    """Keep the lines that have their partner at the gauge and are long enough."""
-    stations, side, _ = partners(lines, gauge_m - INSIDE_M, SPACING_M, STOREY_M)
-    paired = stations >= MIN_STATIONS
-    lines, side = lines.of(paired), side[paired]
-    pairs = links(lines)
-    piece = pieces_of(len(lines.axis), pairs)
-    long = lengths(lines.axis, piece)[piece] >= MIN_LENGTH_M
-    return Heads(lines.of(long), (side[:, None] * lines.across)[long])
+    """Keep the lines that have their partner at the gauge over a length, and continue them without partners.
+
+    Far from the scanner, or beside a train, points show how deep one groove of a track is, and of the other one only
+    a gap in what is level: a groove that has its partner elsewhere has it there as well.
+    """
+    stations, side, apart_m = partners(lines, gauge_m - INSIDE_M, SPACING_M, STOREY_M)
+    paired, piece = stations >= MIN_STATIONS, pieces_of(len(lines.axis), links(lines))
+    with_partner, number = np.unique(piece[paired], return_inverse=True)
+    paired &= np.isin(piece, with_partner[lengths(lines.axis[paired], number) >= MIN_LENGTH_M])
+    if not paired.any():
+        return Heads(lines.of(paired), np.empty((0, 2)))
+    grooves = Heads(lines, _inward(lines, piece, paired, side))
+    alone = np.isin(piece, piece[paired]) & (cKDTree(lines.axis[paired]).query(lines.axis)[0] > OTHER_ROW_M)
+    rest = grooves.of(alone)
+    return (
+        grooves.of(paired)
+        .with_others(rest)
+        .with_others(rest.opposite(median(apart_m, np.where(paired, piece, -1), piece[alone])))
+    )
+
+
+def _inward(lines: Lines, piece: np.ndarray, paired: np.ndarray, side: np.ndarray) -> np.ndarray:
+    """Return unit vectors, (n, 2), to where most of the paired cells, (n,) bool, of a piece have the other rail.
+
+    `side`, (n,), is 1 where this is to the left, and -1 to the right.
+    """
+    left = to_one_side(lines, piece)
+    to_left = np.where(paired, side * np.einsum("ij,ij->i", lines.across, left), 0.0)
+    return np.where(mean_of(to_left, piece)[piece] > 0, 1.0, -1.0)[:, None] * left
 
 
 def _at_edge(grooves: Heads, xyz: np.ndarray, flat: np.ndarray, head_width_m: float) -> Heads:

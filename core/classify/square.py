@@ -106,7 +106,7 @@ def _standing(shown: Shown, level: np.ndarray, paved: Flush, settings: Settings)
     if dense_m2 < LEAST_DENSE_M2:
         return clear
     ground = level == 0  # the vault of a tunnel is as rough as ballast
-    ground[paved.paved] = False  # in a street, no head stands out
+    ground[paved.street(shown.xy)] = False  # no head stands out there
     low = on_low(shown.of(ground), settings)
     return clear.with_others(replace(low, points=np.flatnonzero(ground)[low.points]), settings.head_width_m)
 

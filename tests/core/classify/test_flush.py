@@ -86,6 +86,25 @@ def test_a_groove_whose_one_wall_is_hidden_gives_the_same_axes(seen_m):
     assert (found & on).sum() / found.sum() > 0.93
 
 
+def test_both_rails_go_on_where_one_groove_is_a_gap_without_depth():
+    xyz, on, inside = street(0.002)
+    along, across = turned(xyz, 0.3)
+    unseen = (inside > 0) & (inside < GROOVE) & (across < 0) & (along > 0)
+    xyz, on, along, across = xyz[~unseen], on[~unseen], along[~unseen], across[~unseen]
+    found = classify_square(xyz, SETTINGS).rail
+    for side in (across < 0, across > 0):
+        there = on & side & (along > 0.3) & (along < 3)
+        assert found[there].mean() > 0.9
+    assert (found & on).sum() / found.sum() > 0.95
+
+
+def test_a_groove_that_has_its_partner_nowhere_is_not_a_rail():
+    xyz, _, inside = street(0.002)
+    across = turned(xyz, 0.3)[1]
+    xyz[(inside > 0) & (inside < GROOVE) & (across < 0), 2] += DEPTH
+    assert not classify_square(xyz, SETTINGS).rail.any()
+
+
 def test_grooves_are_found_as_far_from_the_scanner_as_they_hold_a_row_of_points():
     xyz, on, _ = street(0.003)
     few = np.random.RandomState(3).random_sample(len(xyz)) < 0.07
