@@ -13,6 +13,7 @@ from scipy.sparse import csr_matrix
 from scipy.spatial import cKDTree
 
 from .lines import Lines
+from .pieces import linked
 
 ROW_M = 0.015
 """Largest distance across of two cells of the same row, of which a groove may have one on either wall: an arc of 25 m
@@ -101,13 +102,12 @@ def _counts(lines: Lines, inward: np.ndarray, xyz: np.ndarray, flat: np.ndarray)
 
 def _same_row(lines: Lines, inward: np.ndarray) -> csr_matrix:
     """Which cells are of the same row as each cell and within `ALONG_M` of it, and the cell itself, (n, n)."""
-    axis, own = lines.axis, np.arange(len(lines.axis))
-    one, other = cKDTree(axis).query_pairs(ALONG_M, output_type="ndarray").T
-    same = np.abs(np.einsum("ij,ij->i", axis[other] - axis[one], inward[one])) < ROW_M
+    pairs = cKDTree(lines.axis).query_pairs(ALONG_M, output_type="ndarray")
+    one, other = pairs.T
+    same = np.abs(np.einsum("ij,ij->i", lines.axis[other] - lines.axis[one], inward[one])) < ROW_M
     same &= np.abs(lines.height[other] - lines.height[one]) < STOREY_M
     same &= np.einsum("ij,ij->i", inward[one], inward[other]) > 0
-    rows, columns = np.concatenate([own, one[same], other[same]]), np.concatenate([own, other[same], one[same]])
-    return csr_matrix((np.ones(len(rows)), (rows, columns)), shape=(len(axis), len(axis)))
+    return linked(len(lines.axis), pairs[same])
 
 
 def outer_edges(level: np.ndarray, every: np.ndarray, head_width_m: float) -> np.ndarray:

@@ -84,6 +84,13 @@ def pieces_of(count: int, pairs: np.ndarray) -> np.ndarray:
     return connected_components(coo_matrix((ones, tuple(pairs.T)), shape=(count, count)), directed=False)[1]
 
 
+def linked(count: int, pairs: np.ndarray) -> csr_matrix:
+    """Return which cells are a pair with each cell, (m, 2) numbers, and the cell itself: (count, count) ones."""
+    (one, other), own = pairs.T, np.arange(count)
+    rows, columns = np.concatenate([own, one, other]), np.concatenate([own, other, one])
+    return csr_matrix((np.ones(len(rows)), (rows, columns)), shape=(count, count))
+
+
 def lengths(xy: np.ndarray, piece: np.ndarray) -> np.ndarray:
     """Length of each piece: the diagonal of the rectangle around its cells, (pieces,) metres."""
     count = int(piece.max()) + 1 if len(piece) else 0

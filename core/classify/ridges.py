@@ -10,11 +10,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.sparse import csr_matrix
 from scipy.spatial import cKDTree
 
 from .lines import Lines
-from .pieces import lengths, links, pieces_of, to_one_side
+from .pieces import lengths, linked, links, pieces_of, to_one_side
 from .tops import MILLIMETRES, Grid
 
 REACH_M = 0.30
@@ -128,7 +127,7 @@ def on_crests(xy: np.ndarray, height: np.ndarray, lines: Lines, blur_m: float, r
     pairs, own = links(lines, ALONG_M), np.arange(len(lines.axis))
     across = to_one_side(lines, pieces_of(len(own), pairs))
     count, rise = _profiles(xy, height, lines, across, own)
-    same = _along(own, pairs)
+    same = linked(len(own), pairs)
     beyond = np.abs(MIDDLES_M) > reach_m
     count, rise = same @ count, same @ rise
     count[:, beyond] = rise[:, beyond] = 0.0
@@ -164,7 +163,7 @@ def sides_of(level: np.ndarray, grid: Grid, lines: Lines) -> tuple[np.ndarray, n
 def mean_along(values: np.ndarray, lines: Lines, within_m: float) -> np.ndarray:
     """Mean of the values of the cells that are on each cell's line within a distance, (n,); NaN where none is known."""
     known = np.isfinite(values)
-    same = _along(np.arange(len(values)), links(lines, within_m))
+    same = linked(len(values), links(lines, within_m))
     with np.errstate(invalid="ignore"):
         return (same @ np.where(known, values, 0.0)) / (same @ known.astype(float))
 
@@ -202,13 +201,6 @@ def _explained(count: np.ndarray, rise: np.ndarray, crest_m: float, blur_m: floa
     normal = np.einsum("kb,ib,jb->kij", count, model, model) + LEAST_POINTS * np.eye(len(model))
     right = rise @ model.T
     return np.einsum("ki,ki->k", right, np.linalg.solve(normal, right[:, :, None])[:, :, 0])
-
-
-def _along(own: np.ndarray, pairs: np.ndarray) -> csr_matrix:
-    """Which cells, of the numbers `own`, (n,), are a pair with each cell, (m, 2), and the cell itself, (n, n)."""
-    one, other = pairs.T
-    rows, columns = np.concatenate([own, one, other]), np.concatenate([own, other, one])
-    return csr_matrix((np.ones(len(rows)), (rows, columns)), shape=(len(own), len(own)))
 
 
 def _sections(xy: np.ndarray, height: np.ndarray, lines: Lines, piece: np.ndarray) -> np.ndarray:
