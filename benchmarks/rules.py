@@ -110,6 +110,8 @@ SWITCHES = (
     _rule("classify.tops._around", first),
     _rule("classify.tops.SHADOWED_SHARE", 0.5),
     _rule("classify.pieces.SHOWN_SHARE", 0.0),
+    _rule("classify.pieces.OVER_RAD", np.inf),
+    _rule("classify.bars._are_beyond", lambda kept, *_: none_of(kept.cell)),
     _rule("classify.flush.CAVITY_SIGMAS", 0.0),
     _rule("classify.flush.OTHER_ROW_M", np.inf),
     _rule("classify.flush.STREET_M", 0.0),

@@ -23,8 +23,8 @@ from .cells import (
 )
 from .labels import Near, label, whole_heads
 from .lines import Marks
-from .partner import MAJORITY, SPACING_M, rise_above, runs_inside
-from .pieces import LEAST_SINGLE_M, lengths, mean_of, pieces_of, with_partner
+from .partner import MAJORITY, SPACING_M, have_partners, rise_above, runs_inside
+from .pieces import LEAST_SINGLE_M, cross_over, lengths, mean_of, pieces_of, with_partner
 from .ridges import Ridges
 from .settings import Settings, Tolerances
 from .tops import LOW_M
@@ -143,7 +143,7 @@ def _by_shape(
 def _are_rails(
     kept: Kept, thin: bool, beside: Near, shown: Shown, settings: Settings, tolerances: Tolerances
 ) -> np.ndarray:
-    """Return which cells of narrow pieces belong to rails, (n,) bool: those with a partner, and some others.
+    """Return which cells of narrow pieces belong to rails, (n,) bool: those of a track, and some others.
 
     Rails without a partner are as narrow as a head and no narrower, stand as high as a rail does that is not buried in
     ballast, or as those that have a partner, their bed is not steeper than a track's, the ground beside is lower,
@@ -151,9 +151,12 @@ def _are_rails(
     has the points in the height of the heads, and the cells near them.
     """
     partnered = with_partner(kept.pairs, kept.paired)
+    piece = pieces_of(len(kept.cell), kept.pairs)
+    others = _are_guards(kept, shown.tops.z.ravel()[kept.cell], settings)
+    others |= _are_beyond(kept, piece, partnered & ~others, settings, tolerances.partner_m)
+    partnered &= ~others
     if partnered.all():
         return partnered
-    piece = pieces_of(len(kept.cell), kept.pairs)
     width_m, height_m = beside.widths(kept.lines, piece), mean_of(kept.lines.height, piece)
     narrow = width_m < settings.head_width_m + tolerances.wider_single_m
     narrow &= width_m >= SINGLE_WIDTH * settings.head_width_m
@@ -165,7 +168,6 @@ def _are_rails(
     slope = np.hypot(*shown.bed.gradients(kept.lines.axis).T)
     alone = narrow & high & (mean_of(slope, piece) <= SINGLE_SLOPE)
     alone &= slopes_beside(kept.lines, piece, kept.cell, shown.tops) <= SINGLE_FALL
-    alone &= ~_are_guards(kept, piece, partnered, settings)
     free = partnered.copy()
     free[~partnered] = are_free(kept.of(~partnered), shown.tops, SINGLE_DEPTH * kept.lines.height[~partnered])
     alone &= mean_of(free, piece) > MAJORITY
@@ -174,23 +176,44 @@ def _are_rails(
     alone[numbers] = may_hide_partner(lines, number, shown.tops, settings, tolerances.partner_m)
     if not thin:  # wide beams blend a face with what is below it
         alone[numbers] &= ~are_solid(lines, number, shown.xy, shown.height, settings.head_width_m)
-    return partnered | alone[piece]
+    return partnered | (alone[piece] & ~others)
 
 
-def _are_guards(kept: Kept, piece: np.ndarray, partnered: np.ndarray, settings: Settings) -> np.ndarray:
-    """Return which pieces are guard or third rails of a longer one, or of one with a partner, (pieces,) bool.
+def _are_beyond(
+    kept: Kept, piece: np.ndarray, partnered: np.ndarray, settings: Settings, height_m: float
+) -> np.ndarray:
+    """Return which cells are at gauge from a rail of a track, beyond it, and not as high as the rails, (n,) bool.
+
+    Of three lines at gauge, the middle one has a partner on either side: two are a track, and a third one that is not
+    as high is a kerb or an edge. `height_m` is the largest difference of partners.
+    """
+    inner = with_partner(kept.pairs, have_partners(kept.lines, settings.spacings_m, height_m, -SPACING_M))
+    if not inner.any():
+        return inner
+    off_m = np.abs(mean_of(kept.lines.height, piece) - np.median(kept.lines.height[partnered & inner]))
+    return partnered & ~inner & (off_m > AS_HIGH_M)[piece]
+
+
+def _are_guards(kept: Kept, z: np.ndarray, settings: Settings) -> np.ndarray:
+    """Return which cells are of guard or third rails of a longer one, or of one with a partner, (n,) bool.
 
     A guard rail is as high as the rail within a gauge that it guards; it ends before that, and hides it from a scanner
-    beside the track. So does a third rail, which is higher and at most a little further away than the other rail.
+    beside the track, so that the rail seems to go on as the guard rail. A third rail is higher and at most a little
+    further away than the other rail.
     """
     lines = kept.lines
-    length_m = np.where(partnered, np.inf, lengths(lines.axis, piece)[piece])
+    pairs = kept.pairs[~cross_over(lines)[kept.pairs].any(axis=1)]
+    piece = pieces_of(len(kept.cell), pairs)
+    length_m = np.where(with_partner(pairs, kept.paired), np.inf, lengths(lines.axis, piece)[piece])
 
     def inside(beyond_m: float, fits: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> np.ndarray:
         return runs_inside(
-            lines, length_m, kept.pairs, settings.gauges_m, settings.head_width_m, beyond_m, GUARD_SHORTER_M, fits
+            lines, length_m, pairs, settings.gauges_m, settings.head_width_m, beyond_m, GUARD_SHORTER_M, fits
         )
 
-    guards = inside(SPACING_M, lambda own, rail: np.abs(lines.height[own] - lines.height[rail]) < AS_HIGH_M)
+    def as_high(own: np.ndarray, rail: np.ndarray) -> np.ndarray:
+        return np.minimum(*(np.abs(one[own] - one[rail]) for one in (lines.height, z))) < AS_HIGH_M
+
+    guards = inside(SPACING_M, as_high)
     thirds = inside(THIRD_RAIL_M, lambda own, rail: rise_above(lines, rail, own, rail) > HIGHER_M)
-    return (mean_of(guards, piece) > MAJORITY) | (mean_of(thirds, piece) > MAJORITY)
+    return ((mean_of(guards, piece) > MAJORITY) | (mean_of(thirds, piece) > MAJORITY))[piece]

@@ -13,6 +13,15 @@ from .tops import HIGH_M, Tops
 ALIGNED_M = 0.03
 """Two cells continue each other if the axis of each passes the other one this close."""
 
+OVER_M, OVER_LEFT_M = (1.0, 2.0), 0.10
+"""Distances ahead and behind at which the direction of a line is compared with that of what it comes from and leads to,
+and how far across that is at most: the distance of a rail and its guard rail."""
+
+OVER_RAD, OVER_SHARE = 0.04, 0.75
+"""Angle to most of the cells there, and their share, from which a line crosses over: from a rail to the guard rail
+beside it, 0.11 m in 1 to 2 m. An arc of 25 m, the sharpest of a tram, turns by as much, but not to the same side at
+both ends."""
+
 HEAD_M = 0.15
 """Distance within which a higher cell shows that a lower one is the foot of the rail or a fastening: half a foot, and
 the errors of both axes."""
@@ -60,6 +69,21 @@ def links(lines: Lines, within_m: float | None = None) -> np.ndarray:
     for end in (one, other):
         on &= np.abs(np.einsum("ij,ij->i", step, lines.across[end])) < ALIGNED_M
     return pairs[on]
+
+
+def cross_over(lines: Lines) -> np.ndarray:
+    """Return which cells are on a line from one rail to another beside it, (n,) bool: no rail bends to and fro so."""
+    count = len(lines.axis)
+    pairs = cKDTree(lines.axis).query_pairs(OVER_M[1], output_type="ndarray") if count else np.empty((0, 2), int)
+    own, other = np.concatenate([pairs, pairs[:, ::-1]]).T
+    step = lines.axis[other] - lines.axis[own]
+    ahead, left = (np.einsum("ij,ij->i", step, way[own]) for way in (lines.along, lines.across))
+    near = (np.abs(ahead) > OVER_M[0]) & (np.abs(left) < OVER_LEFT_M)
+    turn = (lines.theta[other] - lines.theta[own] + np.pi / 2) % np.pi - np.pi / 2
+    end = (2 * own + (ahead > 0))[near]
+    turned = np.bincount(end, (np.sign(turn) * (np.abs(turn) > OVER_RAD))[near], 2 * count)
+    share = (turned / np.maximum(np.bincount(end, minlength=2 * count), 1)).reshape(count, 2)
+    return np.any([(sense * share >= OVER_SHARE).all(axis=1) for sense in (-1, 1)], axis=0)
 
 
 def _links_past_wheels(lines: Lines) -> np.ndarray:

@@ -287,7 +287,10 @@ def _fitted(near: HeadPoints, up: np.ndarray, likely: np.ndarray) -> tuple[np.nd
 
 
 def _are_wide(near: HeadPoints, up: np.ndarray) -> np.ndarray:
-    """Return at which stations the ridge is certainly bent less than that of a single head, (s,) bool."""
+    """Return at which stations the ridge is certainly bent less than that of a single head, (s,) bool.
+
+    Where few points are seen, the standard error of a window is larger than this difference: then none is.
+    """
     x = near.across / near.width_m
     terms = np.stack([np.ones_like(x), x, x**2])
     whole, count = np.linalg.lstsq(terms.T, up, rcond=None)[0], len(terms)
@@ -299,7 +302,8 @@ def _are_wide(near: HeadPoints, up: np.ndarray) -> np.ndarray:
     seen = normal[:, 0, 0] >= LEAST_ON_RIDGE
     if not seen.any():
         return seen
-    wide = curve - error > WIDE_BEND * min(float(np.quantile(curve[seen], MOST_BENT)), 0.0)
+    single = min(float(np.quantile(curve[seen], MOST_BENT)), 0.0)
+    wide = (curve - error > WIDE_BEND * single) & (error < (WIDE_BEND - 1) * single)
     return minimum_filter1d(maximum_filter1d(wide, WIDE_WINDOW), WIDE_WINDOW)  # without gaps shorter than a window
 
 

@@ -76,6 +76,9 @@ FORM_RADII_M = {"tram": (20.0, 100.0), "narrow gauge": (40.0, 320.0), "yard": (1
 FREE_M = 12.0
 """Plain track before the first and behind the last switch."""
 
+LADDER_APART_M = (25.0, 40.0)
+"""Distance of the toes of the two turnouts of a ladder, which leave to the same side: from the length of one on."""
+
 
 @dataclass(frozen=True)
 class Railway:
@@ -278,7 +281,10 @@ def _branches(
     toe_m = rng.uniform(FREE_M, max(room_m, FREE_M + 0.1))
     starts = [(toe_m, form, turn)]
     if layout == LADDER:
-        starts.append((min(toe_m + rng.uniform(25.0, 40.0), axis.length_m - FREE_M - form.arc_m), form, turn))
+        apart_m = rng.uniform(*LADDER_APART_M)
+        first_m = min(toe_m, axis.length_m - FREE_M - form.arc_m - apart_m)
+        if first_m >= FREE_M:
+            starts = [(at, form, turn) for at in (first_m, first_m + apart_m)]
     if layout == THREE_WAY and len(through) == 1:
         starts.append((toe_m + one_of(rng, (0.0, 3.0, 6.0)), form, -turn))
     curves = [branch(way, at, one, side, axis.length_m - at - one.switch_m - one.arc_m) for at, one, side in starts]

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from rail_extract.core.classify.lines import Lines
-from rail_extract.core.classify.pieces import links, long_enough
+from rail_extract.core.classify.lines import Lines, joined
+from rail_extract.core.classify.pieces import cross_over, links, long_enough
 
 
 def line(*parts):
@@ -20,3 +20,29 @@ def test_wheels_do_not_divide_a_rail_without_a_partner(hidden_m, kept):
     nothing = np.zeros(len(lines.axis), dtype=bool)
     assert (long_enough(lines, links(lines), nothing, nothing, keep_single=True) == kept).all()
     assert not long_enough(lines, links(lines), nothing, nothing, keep_single=False).any()
+
+
+def along_course(course):
+    """Cells, 8 cm apart, on a course to the left of 20 m of straight line, with its directions."""
+    along = np.arange(0.0, 20.0, 0.08)
+    ones, left = np.ones(len(along)), course(along)
+    theta = np.arctan(np.gradient(left, along)) % np.pi
+    return Lines(np.column_stack([along, left]), 0.15 * ones, theta, ones, ones, 1.0)
+
+
+def test_a_line_that_goes_from_a_rail_to_its_guard_rail_crosses_over():
+    lines = along_course(lambda t: np.clip(0.09 * (t - 10.0), 0.0, 0.115))
+    found = lines.axis[cross_over(lines), 0]
+    assert len(found) >= 10
+    assert 9.9 < found.min() < found.max() < 11.4
+
+
+@pytest.mark.parametrize("to_straight_m", [0.0, 10.0])
+def test_the_sharpest_arc_does_not_cross_over(to_straight_m):
+    lines = along_course(lambda t: np.clip(t - to_straight_m, 0.0, None) ** 2 / 50.0)
+    assert not cross_over(lines).any()
+
+
+def test_a_rail_that_crosses_another_one_does_not_cross_over():
+    one, other = along_course(lambda t: 0.09 * (t - 10.0)), along_course(lambda t: 0.0 * t)
+    assert not cross_over(joined(one, other)).any()

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
-from rail_extract.core.heads.edges import Ridge
-from rail_extract.core.heads.head_points import HeadPoints, stations_along
+from rail_extract.core.heads.edges import WIDE_SIGMA_M, Ridge
+from rail_extract.core.heads.head_points import STATION_STEP_M, HeadPoints, stations_along
 
 WIDTH, LENGTH_M, BEND = 0.072, 40.0, 8.0
 
@@ -63,6 +63,12 @@ def test_a_line_stays_along_a_ridge_that_is_wider_than_a_head(seed):
     beside, elsewhere = np.abs(ridge.t - 20.0) < 1.5, np.abs(ridge.t - 20.0) > 4.0
     assert abs(np.average(ridge.offset_m[beside], weights=ridge.information[beside])) < 0.002
     assert ridge.information[beside].mean() < 0.1 * ridge.information[elsewhere].mean()
+
+
+def test_chance_makes_no_ridge_wide_of_which_few_points_are_seen():
+    """A third of the straight rails of a drone's cloud stayed as the raster had drawn them (world 12724)."""
+    ridges = [ridge_of(*ridge_points(per_m=10, seed=seed)) for seed in range(20)]
+    assert np.mean([ridge.information == STATION_STEP_M / WIDE_SIGMA_M**2 for ridge in ridges]) < 0.01
 
 
 @pytest.mark.parametrize("count", [0, 1, 2, 3, 5, 12])

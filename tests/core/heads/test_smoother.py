@@ -111,6 +111,17 @@ def test_a_line_that_bends_is_straightened_but_not_one_in_a_curve():
         assert np.sqrt(np.mean(left**2)) < 0.0012
 
 
+def test_a_sharp_arc_that_begins_abruptly_is_kept_by_few_points():
+    """World 12969: a tram turnout of 25 m below a drone, with an error of 10 cm per point."""
+    t = np.arange(0.0, 22.05, 0.1)
+    line = np.column_stack([t, np.clip(t - 8.0, 0.0, None) ** 2 / 50.0])
+    off_m = []
+    for seed in range(8):
+        places, values, information = measured(lambda t: 0.0 * t, seed, 22.0, 4.0, 0.05)
+        off_m.append(smooth(places, values, information, 0.0, 22.0, line, BLUNT).at(t))
+    assert np.sqrt(np.mean(np.square(off_m))) < 0.025
+
+
 def test_a_course_may_turn_where_nothing_is_measured():
     """Cubics that are 0 at both ends of a gap of 10 m, and beyond the last value."""
     found = bridge_error(np.array([0.0, 10.0]), np.array([-3.0, 0.0, 5.0, 8.0, 10.0, 12.0]), 1e-4)

@@ -7,7 +7,7 @@ import pytest
 from rail_extract.core.comparison import cut
 from rail_extract.laboratory.scenes.raw_world import HEAD
 from rail_extract.laboratory.worlds.classes import HEADS, classified, draw_classification
-from rail_extract.laboratory.worlds.railway import draw_railway
+from rail_extract.laboratory.worlds.railway import LADDER, draw_railway
 from rail_extract.laboratory.worlds.world import make
 from scipy.spatial import cKDTree
 
@@ -68,6 +68,15 @@ def test_many_worlds_differ_in_what_counts():
     sharpest = [np.abs(one.reference.curvature).max() for one in railways]
     assert max(sharpest) > 1 / 60
     assert sum(one == 0 for one in sharpest) > 10
+
+
+def test_turnouts_of_a_ladder_do_not_overlap():
+    """Those of seed 13056 were half a metre apart, and their rails 50 mm."""
+    ladders = [one for one in map(draw_railway, range(12600, 13100)) if one.layout == LADDER and not one.plain]
+    pairs = [one.tracks[-2:] for one in ladders if one.tracks[-2].curve is not one.reference]
+    ends = [[np.hypot(*(first.curve.xy[end] - second.curve.xy[end])) for end in (0, -1)] for first, second in pairs]
+    assert len(ends) >= 8
+    assert np.max(ends, axis=1).min() > 24.9
 
 
 def test_tracks_that_meet_have_rails_at_one_height():
