@@ -70,9 +70,10 @@ VEHICLE_NEAR_M = 3.0
 VEHICLE_WEIGHT = 0.25
 """Weight of a level that is rather that of a vehicle: it counts if the lower one is very short."""
 
-FOOT_M, FOOT_SHARE = 0.20, 0.9
+FOOT_M, FOOT_SHARE, HEAD_BINS = 0.20, 0.9, 20
 """Height of the tallest rails with their pad, up to which a level above another one may be the head above its foot; and
-share of the bins of the foot in which the head is seen, too. No part of a vehicle is this low along all of a rail."""
+share of the bins of the foot in which the head is seen, too, or bins of the head, 10 m, if something hides more of it.
+No part of a vehicle is this low along all of a rail, or as long: wheels, rail brakes and the frames of bogies are."""
 
 ABOVE_M, BELOW_M = 0.03, 0.06
 """Heights above and below its level up to which points are on a head: weeds are higher, and faces with their noise are
@@ -228,7 +229,8 @@ def _weight(piece: np.ndarray, pieces: Sequence[np.ndarray]) -> float:
 
 def _is_foot(lower: np.ndarray, upper: np.ndarray, apart_m: float) -> bool:
     """Return whether a level may be that of the foot of a rail below another one, that of its head."""
-    return apart_m <= FOOT_M and bool(np.isin(lower[:, 0], upper[:, 0]).mean() >= FOOT_SHARE)
+    share = np.isin(lower[:, 0], upper[:, 0]).mean()
+    return apart_m <= FOOT_M and bool(share >= FOOT_SHARE or len(upper) >= HEAD_BINS)
 
 
 def _near(piece: np.ndarray, other: np.ndarray, near: float) -> np.ndarray:

@@ -1,9 +1,11 @@
 """Which pieces of line are long enough to be kept."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from rail_extract.core.classify.lines import Lines, joined
-from rail_extract.core.classify.pieces import cross_over, links, long_enough
+from rail_extract.core.classify.pieces import cross_over, links, long_enough, lower_than_beside
 
 
 def line(*parts):
@@ -46,3 +48,13 @@ def test_the_sharpest_arc_does_not_cross_over(to_straight_m):
 def test_a_rail_that_crosses_another_one_does_not_cross_over():
     one, other = along_course(lambda t: 0.09 * (t - 10.0)), along_course(lambda t: 0.0 * t)
     assert not cross_over(joined(one, other)).any()
+
+
+@pytest.mark.parametrize(("apart_m", "lower"), [(0.11, True), (0.17, True), (0.24, False)])
+def test_what_is_lower_beside_a_rail_is_no_head(apart_m, lower):
+    """In world 13104, the ends of sleepers 0.15 m beside a rail were at gauge from a kerb."""
+    rail, beside = along_course(lambda t: 0.0 * t), along_course(lambda t: apart_m + 0.0 * t)
+    both = joined(rail, replace(beside, height=beside.height - 0.09))
+    found = lower_than_beside(both, 0.045)
+    assert not found[: len(rail.axis)].any()
+    assert found[len(rail.axis) :].all() == lower

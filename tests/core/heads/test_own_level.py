@@ -57,6 +57,15 @@ def test_a_head_is_no_vehicle_on_its_foot(foot_density):
     assert on_foot.mean() < 0.01
 
 
+def test_a_head_is_no_vehicle_beside_the_part_of_its_foot_whose_head_a_train_hides():
+    """In world 12595 (classified), 56 m of a rail beside 20 m of its foot were left out."""
+    heads = band(0, 30, profile=hilly), band(50, 100, seed=1, profile=hilly)
+    foot = band(30, 50, 100, -0.135, across=0.02, half=0.03, seed=2, profile=hilly)
+    *on_heads, on_foot = own(*heads, foot)
+    assert np.concatenate(on_heads).mean() > 0.98
+    assert on_foot.mean() < 0.01
+
+
 @pytest.mark.parametrize("wave_m", [0.04, 0.06])
 def test_a_rail_whose_level_drifts_is_not_a_vehicle_where_noise_breaks_it_into_pieces(wave_m):
     (rail,) = own(band(0, 100, 70, noise=0.015, profile=lambda t: wave_m * np.sin(2 * np.pi * t / 140)))
