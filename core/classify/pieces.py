@@ -22,9 +22,9 @@ OVER_RAD, OVER_SHARE = 0.04, 0.75
 beside it, 0.11 m in 1 to 2 m. An arc of 25 m, the sharpest of a tram, turns by as much, but not to the same side at
 both ends."""
 
-HEAD_M = 0.20
-"""Distance within which a higher cell shows that a lower one is not a head: the foot of the rail, a fastening, the end
-of a sleeper. Nothing else may be as near to a rail but its guard rail, which is as high."""
+HEAD_M = 0.17
+"""Distance within which a higher cell shows that a lower one is not a head: half a foot, the fastening beyond it, and
+the errors of both axes. Only a guard rail is as near to a rail, and it is as high."""
 
 LEAST_M = 1.5
 """Shortest piece of a rail that has its partner."""
