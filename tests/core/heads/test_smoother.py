@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from rail_extract.core.heads.smoother import (
     BLUNT,
+    BLUNT_HEIGHTS,
     SHARP,
     bridge_error,
     smooth,
@@ -120,6 +121,15 @@ def test_a_sharp_arc_that_begins_abruptly_is_kept_by_few_points():
         places, values, information = measured(lambda t: 0.0 * t, seed, 22.0, 4.0, 0.05)
         off_m.append(smooth(places, values, information, 0.0, 22.0, line, BLUNT).at(t))
     assert np.sqrt(np.mean(np.square(off_m))) < 0.025
+
+
+def test_heights_do_not_follow_a_stray_bin():
+    """In a survey by a drone, points 9 m above a rail are classified as rail; the line went up to them."""
+    t = np.arange(0.125, 60.0, 0.25)
+    heights = np.random.default_rng(0).normal(0, 0.01, len(t))
+    heights[120] = 9.0
+    course = smooth(t, heights, np.full(len(t), 4 / 0.02**2), -1.0, 61.0, None, BLUNT_HEIGHTS).at(t)
+    assert np.abs(np.diff(course) / 0.25).max() < 0.1
 
 
 def test_a_course_may_turn_where_nothing_is_measured():
