@@ -187,11 +187,12 @@ def _are_beyond(
     Of three lines at gauge, the middle one has a partner on either side: two are a track, and a third one that is not
     as high is a kerb or an edge. `height_m` is the largest difference of partners.
     """
-    inner = with_partner(kept.pairs, have_partners(kept.lines, settings.spacings_m, height_m, -SPACING_M))
-    if not inner.any():
-        return inner
-    off_m = np.abs(mean_of(kept.lines.height, piece) - np.median(kept.lines.height[partnered & inner]))
-    return partnered & ~inner & (off_m > AS_HIGH_M)[piece]
+    alone = have_partners(kept.lines, settings.spacings_m, height_m, -SPACING_M)  # that have no other partner
+    certain = partnered & with_partner(kept.pairs, alone)
+    if not certain.any():
+        return certain
+    off_m = np.abs(mean_of(kept.lines.height, piece) - np.median(kept.lines.height[certain]))
+    return partnered & ~certain & (off_m > AS_HIGH_M)[piece]
 
 
 def _are_guards(kept: Kept, z: np.ndarray, settings: Settings) -> np.ndarray:
