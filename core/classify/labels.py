@@ -29,9 +29,8 @@ BEYOND_M = HIDDEN_M + 0.3
 """Distance to an axis up to which a place may be on it. Behind a wheel at the end of a cloud, the rail is too short to
 show its direction: the axis before the wheel continues to it, and over some of its cells."""
 
-WIDEST_M = 0.067
-"""Distance from the axis within which points count towards the width of a top: short of a guard rail, whose head is 73
-mm and more from the axis of the rail, when the face that is seen draws this 10 mm aside."""
+WIDEST_M = 0.075
+"""Distance from the axis within which points count towards the width of a top: short of a guard rail."""
 
 SECTION_M, BEYOND_SHARE = 1.0, 0.05
 """Length of a rail over which a width is measured, and share of the points of a top, on either side, that may be off
