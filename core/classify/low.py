@@ -15,7 +15,7 @@ from scipy.ndimage import uniform_filter
 from .cells import Candidates, Shown, Standing, as_wanted, density_at, fitting, on_lines, on_rails, with_pairs
 from .labels import Near, label
 from .lines import Lines, reach_at
-from .pieces import pieces_of, with_partner
+from .pieces import mean_of, pieces_of, with_partner
 from .ridges import Ridges, cells_beside, on_crests
 from .settings import Settings
 from .tops import EMPTY, MILLIMETRES, WINDOW_M, Grid
@@ -58,6 +58,10 @@ ON_HEAD_M = 0.10
 off, and as much of the ballast. Tripods see nothing nearer on the far side of a head, and what is further away may be
 a check rail."""
 
+MOSTLY = 0.7
+"""Share of the cells of a piece that have a partner: of edges at the shoulder and on the slope below it, 0.57 have one,
+of heads 0.9 and more."""
+
 HIGHEST_M = 0.10
 """Height above its surroundings below which points may be of a head that stands just out of its bed: those of wheels
 and vehicles on it would lift its cross-section."""
@@ -97,7 +101,8 @@ def on_low(shown: Shown, settings: Settings) -> Standing:
         of_heads = shown.of(shown.height < HIGHEST_M)
         width_m = Ridges.measure(of_heads.xy, of_heads.height, kept.lines, piece).width_m
         too_wide = width_m >= settings.head_width_m + tolerances.wider_m  # where one side is hidden, this is not known
-        kept = fitting(kept, piece, ~too_wide, settings, tolerances)
+        heads = ~too_wide & (mean_of(kept.paired, piece) >= MOSTLY)
+        kept = fitting(kept, piece, heads, settings, tolerances)
         kept = replace(kept, lines=_on_heads(of_heads, kept.lines, settings.head_width_m))
     cells = cells_beside(grid, kept.lines, (settings.head_width_m - grid.cell_m) / 2)
     chosen = label(shown.tops, cells, shown.cell, shown.height, tolerances)
