@@ -187,8 +187,8 @@ def _are_beyond(
     Of three lines at gauge, the middle one has a partner on either side: two are a track, and a third one that is not
     as high is a kerb or an edge. `height_m` is the largest difference of partners.
     """
-    alone = have_partners(kept.lines, settings.spacings_m, height_m, -SPACING_M)  # that have no other partner
-    certain = partnered & with_partner(kept.pairs, alone)
+    unrivalled = have_partners(kept.lines, settings.spacings_m, height_m, -SPACING_M)
+    certain = partnered & with_partner(kept.pairs, unrivalled)
     if not certain.any():
         return certain
     off_m = np.abs(mean_of(kept.lines.height, piece) - np.median(kept.lines.height[certain]))

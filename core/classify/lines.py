@@ -156,6 +156,11 @@ def joined(one: Lines, other: Lines) -> Lines:
     return Lines(axis, height, theta, cover, pure, one.reach_m)
 
 
+def turns(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Return by how much directions turn to others, radians from minus to plus a quarter turn: lines have no sense."""
+    return (other - one + np.pi / 2) % np.pi - np.pi / 2
+
+
 def find_lines(
     marks: Marks, reach_m: float, along_m: float, beside_line_m: float, wanted: np.ndarray | None = None
 ) -> Lines:

@@ -15,7 +15,7 @@ from scipy.ndimage import uniform_filter
 from .cells import Candidates, Shown, Standing, as_wanted, density_at, fitting, on_lines, on_rails, with_pairs
 from .labels import Near, label
 from .lines import Lines, reach_at
-from .pieces import mean_of, pieces_of, with_partner
+from .pieces import pieces_of, with_partner
 from .ridges import Ridges, cells_beside, on_crests
 from .settings import Settings
 from .tops import EMPTY, MILLIMETRES, WINDOW_M, Grid
@@ -95,14 +95,13 @@ def on_low(shown: Shown, settings: Settings) -> Standing:
     density = density_at(shown.bed.coarse, grid.middles(found.marks))
     kept = with_pairs(on_lines(found, reach_at(density), tolerances, settings), settings, tolerances)
     kept = on_rails(kept, np.ones(len(kept.cell), dtype=bool), settings, tolerances)
-    kept = kept.of(with_partner(kept.pairs, kept.paired))
+    kept = kept.of(with_partner(kept.pairs, kept.paired, MOSTLY))
     if len(kept.cell):
         piece = pieces_of(len(kept.cell), kept.pairs)
         of_heads = shown.of(shown.height < HIGHEST_M)
         width_m = Ridges.measure(of_heads.xy, of_heads.height, kept.lines, piece).width_m
         too_wide = width_m >= settings.head_width_m + tolerances.wider_m  # where one side is hidden, this is not known
-        heads = ~too_wide & (mean_of(kept.paired, piece) >= MOSTLY)
-        kept = fitting(kept, piece, heads, settings, tolerances)
+        kept = fitting(kept, piece, ~too_wide, settings, tolerances)
         kept = replace(kept, lines=_on_heads(of_heads, kept.lines, settings.head_width_m))
     cells = cells_beside(grid, kept.lines, (settings.head_width_m - grid.cell_m) / 2)
     chosen = label(shown.tops, cells, shown.cell, shown.height, tolerances)

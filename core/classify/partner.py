@@ -12,7 +12,7 @@ import numpy as np
 from scipy.ndimage import median
 from scipy.spatial import cKDTree
 
-from .lines import Lines
+from .lines import Lines, turns
 from .pieces import LEAST_PAIRED, mean_of
 
 STATIONS = (-0.6, -0.3, 0.0, 0.3, 0.6)
@@ -144,7 +144,7 @@ def _partnered(
     apart = np.einsum("ij,ij->i", lines.axis[other] - lines.axis[own], lines.across[own])
     fits = np.abs(apart - left_m) < tolerance_m
     fits &= _are_level(lines, own, other, height_m)
-    fits &= _angle(lines.theta[other], lines.theta[own]) < ANGLE_RAD
+    fits &= np.abs(turns(lines.theta[other], lines.theta[own])) < ANGLE_RAD
     cell, found = np.zeros(len(lines.axis), dtype=np.int64), np.full(len(lines.axis), np.nan)
     # Written from the farthest to the nearest, the nearest one stays.
     cell[own[fits][::-1]], found[own[fits][::-1]] = other[fits][::-1], apart[fits][::-1]
@@ -202,7 +202,7 @@ def runs_inside(
     left = np.abs(np.einsum("ij,ij->i", step, lines.across[rail]))
     ahead = np.abs(np.einsum("ij,ij->i", step, lines.along[rail]))
     beside = (left > head_width_m + INSIDE_M) & (left < too_far_m) & (ahead < LEVEL_WITH_M)
-    beside &= _angle(lines.theta[own], lines.theta[rail]) < PARALLEL_RAD
+    beside &= np.abs(turns(lines.theta[own], lines.theta[rail])) < PARALLEL_RAD
     beside &= rank[own] + more < rank[rail]
     if fits is not None:
         beside &= fits(own, rail)
@@ -216,8 +216,3 @@ def _majority(flag: np.ndarray, links: np.ndarray) -> np.ndarray:
     votes = flag + np.bincount(both[:, 0], flag[both[:, 1]], len(flag))
     voters = 1 + np.bincount(both[:, 0], minlength=len(flag))
     return votes > MAJORITY * voters
-
-
-def _angle(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """Angle between directions, radians from 0 to a quarter turn."""
-    return np.abs((one - other + np.pi / 2) % np.pi - np.pi / 2)

@@ -7,7 +7,7 @@ from scipy.sparse import coo_matrix, csr_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from .lines import Lines
+from .lines import Lines, turns
 from .tops import HIGH_M, Tops
 
 ALIGNED_M = 0.03
@@ -74,16 +74,24 @@ def links(lines: Lines, within_m: float | None = None) -> np.ndarray:
 def cross_over(lines: Lines) -> np.ndarray:
     """Return which cells are on a line from one rail to another beside it, (n,) bool: no rail bends to and fro so."""
     count = len(lines.axis)
-    pairs = cKDTree(lines.axis).query_pairs(OVER_M[1], output_type="ndarray") if count else np.empty((0, 2), int)
-    own, other = np.concatenate([pairs, pairs[:, ::-1]]).T
-    step = lines.axis[other] - lines.axis[own]
-    ahead, left = (np.einsum("ij,ij->i", step, way[own]) for way in (lines.along, lines.across))
+    own, other, ahead, left = _around(lines, OVER_M[1])
     near = (np.abs(ahead) > OVER_M[0]) & (np.abs(left) < OVER_LEFT_M)
-    turn = (lines.theta[other] - lines.theta[own] + np.pi / 2) % np.pi - np.pi / 2
+    turn = turns(lines.theta[own], lines.theta[other])
     end = (2 * own + (ahead > 0))[near]
     turned = np.bincount(end, (np.sign(turn) * (np.abs(turn) > OVER_RAD))[near], 2 * count)
     share = (turned / np.maximum(np.bincount(end, minlength=2 * count), 1)).reshape(count, 2)
     return np.any([(sense * share >= OVER_SHARE).all(axis=1) for sense in (-1, 1)], axis=0)
+
+
+def _around(lines: Lines, within_m: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return cells, others at most `within_m` from them, and how far these are ahead and to the left, (k,) each."""
+    if not len(lines.axis):
+        return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64), np.empty(0), np.empty(0)
+    pairs = cKDTree(lines.axis).query_pairs(within_m, output_type="ndarray")
+    own, other = np.concatenate([pairs, pairs[:, ::-1]]).T
+    step = lines.axis[other] - lines.axis[own]
+    ahead, left = (np.einsum("ij,ij->i", step, way[own]) for way in (lines.along, lines.across))
+    return own, other, ahead, left
 
 
 def _links_past_wheels(lines: Lines) -> np.ndarray:
@@ -160,10 +168,10 @@ def long_enough(
     return kept | long
 
 
-def with_partner(pairs: np.ndarray, paired: np.ndarray) -> np.ndarray:
-    """Return which cells belong to pieces that have a partner, (n,) bool; see `long_enough`."""
+def with_partner(pairs: np.ndarray, paired: np.ndarray, least: float = LEAST_PAIRED) -> np.ndarray:
+    """Return which cells belong to pieces that have a partner, as `least` of their cells have, (n,) bool."""
     piece = pieces_of(len(paired), pairs)
-    return (np.bincount(piece, paired) > LEAST_PAIRED * np.bincount(piece))[piece]
+    return (np.bincount(piece, paired) > least * np.bincount(piece))[piece]
 
 
 def _reaches(xy: np.ndarray, piece: np.ndarray, least_m: float, open_ended: np.ndarray) -> np.ndarray:
@@ -176,19 +184,12 @@ def shares_of_length(lines: Lines, half_m: float) -> np.ndarray:
 
     Two cells within `half_m` across are on one line.
     """
-    count = len(lines.axis)
-    if count < 2:
-        return np.zeros(count)
-    pairs = cKDTree(lines.axis).query_pairs(np.hypot(GAP_M, half_m), output_type="ndarray")
-    own, other = np.concatenate([pairs, pairs[:, ::-1]]).T
-    step = lines.axis[other] - lines.axis[own]
-    along = np.einsum("ij,ij->i", step, lines.along[own])
-    beside = np.abs(np.einsum("ij,ij->i", step, lines.across[own])) < half_m
-    share_m = np.zeros(count)
-    for ahead in (True, False):
-        mine = beside & ((along > 0) == ahead)
-        gap_m = np.full(count, GAP_M)
-        np.minimum.at(gap_m, own[mine], np.abs(along[mine]))
+    own, _, ahead, left = _around(lines, np.hypot(GAP_M, half_m))
+    share_m = np.zeros(len(lines.axis))
+    for is_ahead in (True, False):
+        mine = (np.abs(left) < half_m) & ((ahead > 0) == is_ahead)
+        gap_m = np.full(len(share_m), GAP_M)
+        np.minimum.at(gap_m, own[mine], np.abs(ahead[mine]))
         share_m += np.where(gap_m < GAP_M, gap_m / 2, 0.0)
     return share_m
 
