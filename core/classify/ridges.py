@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from .lines import Lines
-from .pieces import lengths, linked, links, pieces_of, to_one_side
+from .pieces import SHOWN_SHARE, lengths, linked, links, pieces_of, to_one_side
 from .tops import MILLIMETRES, Grid
 
 REACH_M = 0.30
@@ -204,10 +204,13 @@ def _explained(count: np.ndarray, rise: np.ndarray, crest_m: float, blur_m: floa
 
 
 def _sections(xy: np.ndarray, height: np.ndarray, lines: Lines, piece: np.ndarray) -> np.ndarray:
-    """Mean heights of the points beside each piece relative to its line, (pieces, BINS); NaN in bins without points."""
+    """Mean heights of the points beside each piece relative to its line, (pieces, BINS); NaN in bins that are unseen.
+
+    What is in the shadow of a head shows few points, of the beams that also meet its edge: their height is between.
+    """
     count, rise = _profiles(xy, height, lines, to_one_side(lines, piece), piece)
     with np.errstate(invalid="ignore"):
-        return rise / count
+        return np.where(count < SHOWN_SHARE * count[:, ::-1], np.nan, rise / count)
 
 
 def _profiles(
