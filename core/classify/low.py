@@ -16,7 +16,7 @@ from .cells import Candidates, Shown, Standing, as_wanted, density_at, fitting, 
 from .labels import Near, label
 from .lines import Lines, reach_at
 from .pieces import pieces_of, with_partner
-from .ridges import Ridges, cells_beside, on_crests
+from .ridges import Ridges, above_sides, cells_beside, on_crests
 from .settings import Settings
 from .tops import EMPTY, MILLIMETRES, WINDOW_M, Grid
 
@@ -58,14 +58,6 @@ ON_HEAD_M = 0.10
 off, and as much of the ballast. Tripods see nothing nearer on the far side of a head, and what is further away may be
 a check rail."""
 
-MOSTLY = 0.7
-"""Share of the cells of a piece that have a partner: of edges at the shoulder and on the slope below it, 0.57 have one,
-of heads 0.9 and more."""
-
-FLAT_M = 0.055
-"""Least standard deviation of a ridge whose sides are too flat for a head. Measured: heads 9 to 22 mm, and 41 mm where
-one side is in shadow; edges of slabs and shoulders, from which the bed falls to one side only, 76 to 141 mm."""
-
 HIGHEST_M = 0.10
 """Height above its surroundings below which points may be of a head that stands just out of its bed: those of wheels
 and vehicles on it would lift its cross-section."""
@@ -93,20 +85,22 @@ def on_low(shown: Shown, settings: Settings) -> Standing:
     grid, tolerances = shown.tops.grid, settings.tolerances(thin=False)
     low = find_low(grid, shown.mean_heights())
     rise = np.where(np.isfinite(low.rise), np.round(low.rise * MILLIMETRES), EMPTY).astype(np.int16)
+    above_bed = shown.height
     above = (shown.height - np.nan_to_num(low.base).ravel()[shown.cell]).astype(np.float32)
     shown = replace(shown, height=above, tops=replace(shown.tops, top=rise))
     found = Candidates.of(shown, np.flatnonzero(low.crest))
     density = density_at(shown.bed.coarse, grid.middles(found.marks))
     kept = with_pairs(on_lines(found, reach_at(density), tolerances, settings), settings, tolerances)
     kept = on_rails(kept, np.ones(len(kept.cell), dtype=bool), settings, tolerances)
-    kept = kept.of(with_partner(kept.pairs, kept.paired, MOSTLY))
+    kept = kept.of(with_partner(kept.pairs, kept.paired))
     if len(kept.cell):
         piece = pieces_of(len(kept.cell), kept.pairs)
-        of_heads = shown.of(shown.height < HIGHEST_M)
-        ridges = Ridges.measure(of_heads.xy, of_heads.height, kept.lines, piece)
-        too_wide = ridges.width_m >= settings.head_width_m + tolerances.wider_m
-        flat = ridges.spread_m > FLAT_M  # where one side is hidden, neither is known
-        kept = fitting(kept, piece, ~too_wide & ~flat, settings, tolerances)
+        low_enough = shown.height < HIGHEST_M
+        of_heads = shown.of(low_enough)
+        width_m = Ridges.measure(of_heads.xy, of_heads.height, kept.lines, piece).width_m
+        heads = ~(width_m >= settings.head_width_m + tolerances.wider_m)  # where one side is hidden, this is not known
+        heads &= above_sides(of_heads.xy, above_bed[low_enough], kept.lines, piece) > 0
+        kept = fitting(kept, piece, heads, settings, tolerances)
         kept = replace(kept, lines=_on_heads(of_heads, kept.lines, settings.head_width_m))
     cells = cells_beside(grid, kept.lines, (settings.head_width_m - grid.cell_m) / 2)
     chosen = label(shown.tops, cells, shown.cell, shown.height, tolerances)

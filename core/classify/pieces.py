@@ -168,10 +168,10 @@ def long_enough(
     return kept | long
 
 
-def with_partner(pairs: np.ndarray, paired: np.ndarray, least: float = LEAST_PAIRED) -> np.ndarray:
-    """Return which cells belong to pieces that have a partner, as `least` of their cells have, (n,) bool."""
+def with_partner(pairs: np.ndarray, paired: np.ndarray) -> np.ndarray:
+    """Return which cells belong to pieces that have a partner, (n,) bool."""
     piece = pieces_of(len(paired), pairs)
-    return (np.bincount(piece, paired) > least * np.bincount(piece))[piece]
+    return (np.bincount(piece, paired) > LEAST_PAIRED * np.bincount(piece))[piece]
 
 
 def _reaches(xy: np.ndarray, piece: np.ndarray, least_m: float, open_ended: np.ndarray) -> np.ndarray:

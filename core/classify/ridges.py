@@ -63,6 +63,13 @@ CRESTS_M = np.arange(-0.06, 0.061, 0.004)
 HALF_WAY = (0.5,)
 """Part of the way down at which the two sides of a ridge are: there, blur does not move the side of a head."""
 
+GROUND_M, GROUND_SEEN = (0.10, 0.30), 0.5
+"""Distances from the axis between which the ground on one side of a ridge shows its slope, and share of the bins there
+that must be seen: from beyond the head and its blurred side on."""
+
+CREST_M = 0.02
+"""Distance from the axis up to which the top of a ridge is its crest: half a head, less the error of the axis."""
+
 SIDES_M = np.linspace(-1.0, 1.0, 11)
 """Places along the line at which the sides of a ridge are looked at: check rails are 3 m long and more."""
 
@@ -139,6 +146,24 @@ def on_crests(xy: np.ndarray, height: np.ndarray, lines: Lines, blur_m: float, r
     return replace(lines, axis=lines.axis + offset_m[:, None] * across)
 
 
+def above_sides(xy: np.ndarray, height: np.ndarray, lines: Lines, piece: np.ndarray) -> np.ndarray:
+    """Find how high ridges stand above the ground on either side as it would go on below them, (pieces,) metres.
+
+    Points are given by place and height above the bed. The edge of a slab or a shoulder is a crest as well, but the
+    ground on one side leads up to it. A side that is not seen does not count; without a crest, the height is NaN.
+    """
+    sections, middle = _sections(xy, height, lines, piece), BINS // 2
+    out_m = MIDDLES_M[middle:]
+    on_crest, beside = out_m < CREST_M, (out_m > GROUND_M[0]) & (out_m < GROUND_M[1])
+    sides = sections[:, middle:], sections[:, middle - 1 :: -1]
+    crest_m, _, _ = _straight(
+        np.concatenate([side[:, on_crest] for side in sides], axis=1), np.tile(out_m[on_crest], 2)
+    )
+    grounds = [_straight(side[:, beside], out_m[beside]) for side in sides]
+    rises = [np.where(seen < GROUND_SEEN, np.inf, crest_m - at_axis_m) for _, at_axis_m, seen in grounds]
+    return np.min(rises, axis=0)
+
+
 def sides_of(level: np.ndarray, grid: Grid, lines: Lines) -> tuple[np.ndarray, np.ndarray]:
     """Find how far the left and the right side of each ridge is from its line, half-way down, (n,) metres.
 
@@ -201,6 +226,21 @@ def _explained(count: np.ndarray, rise: np.ndarray, crest_m: float, blur_m: floa
     normal = np.einsum("kb,ib,jb->kij", count, model, model) + LEAST_POINTS * np.eye(len(model))
     right = rise @ model.T
     return np.einsum("ki,ki->k", right, np.linalg.solve(normal, right[:, :, None])[:, :, 0])
+
+
+def _straight(values: np.ndarray, places_m: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Fit straight lines to rows of values, (k, n), at places, (n,); NaN values are unknown.
+
+    Returns the mean value, NaN without any, the value of the line at 0, and the share of the values that are known,
+    (k,) each.
+    """
+    known = np.isfinite(values)
+    value, some = np.where(known, values, 0.0), known.sum(axis=1)
+    with np.errstate(invalid="ignore"):
+        mean, place_m = value.sum(axis=1) / some, known @ places_m / some
+    step_m = np.where(known, places_m - place_m[:, None], 0.0)
+    slope = (value * step_m).sum(axis=1) / np.maximum((step_m**2).sum(axis=1), BIN_M**2)
+    return mean, mean - slope * place_m, some / len(places_m)
 
 
 def _sections(xy: np.ndarray, height: np.ndarray, lines: Lines, piece: np.ndarray) -> np.ndarray:
