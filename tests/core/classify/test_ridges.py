@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from rail_extract.core.classify.lines import Lines
-from rail_extract.core.classify.ridges import on_crests, steadied
+from rail_extract.core.classify.ridges import Ridges, above_sides, on_crests, steadied
 from rail_extract.core.classify.settings import Settings, Way
 from rail_extract.core.classify.square import classify_square
 from scipy.special import ndtr
@@ -105,6 +105,50 @@ def test_crests_are_found_where_lines_point_either_way():
     xy = np.column_stack([rng.uniform(0.0, 4.0, 20_000), rng.uniform(-0.3, 0.3, 20_000)])
     height = 0.15 * np.exp(-0.5 * ((xy[:, 1] - 0.02) / 0.042) ** 2)
     assert on_crests(xy, height, lines, 0.042).axis[:, 1] == pytest.approx(0.02, abs=0.002)
+
+
+def section(height_at, seen_at=lambda left_m: np.ones(len(left_m))):
+    """Points beside a line along x, of heights and shares that are seen by their distances to the left; the line."""
+    rng = np.random.RandomState(6)
+    xy = np.column_stack([rng.uniform(0.0, 4.0, 20_000), rng.uniform(-0.3, 0.3, 20_000)])
+    xy = xy[rng.uniform(size=len(xy)) < seen_at(xy[:, 1])]
+    return xy, height_at(xy[:, 1]), lines_beside(np.zeros(100)), np.zeros(100, dtype=np.int64)
+
+
+@pytest.mark.parametrize(("mixed", "known"), [(0.05, False), (0.3, True)])
+def test_a_head_is_no_wider_for_what_is_seen_in_its_shadow(mixed, known):
+    """Beams that meet its edge and the bed behind it are between both in height (world 13587)."""
+    shadow = (0.036, 0.15)
+
+    def height_at(left_m):
+        return np.where(np.abs(left_m) < 0.036, 0.05, np.where((left_m > 0) & (left_m < shadow[1]), 0.04, 0.0))
+
+    def seen_at(left_m):
+        return np.where((left_m > shadow[0]) & (left_m < shadow[1]), mixed, 1.0)
+
+    width_m = Ridges.measure(*section(height_at, seen_at)).width_m[0]
+    assert width_m == pytest.approx(0.036 + shadow[1], abs=0.01) if known else np.isnan(width_m)
+
+
+@pytest.mark.parametrize(
+    ("height_at", "above_m"),
+    [
+        (lambda left_m: np.where(np.abs(left_m) < 0.036, 0.05, 0.0), 0.05),
+        (lambda left_m: np.where(np.abs(left_m) < 0.036, 0.05, 0.0) + 0.1 * left_m, 0.05),
+        (lambda left_m: np.where(left_m > 0, -0.3 * left_m, 0.0), -0.0015),
+        (lambda left_m: -0.2 * np.abs(left_m), -0.002),
+    ],
+    ids=["head", "head on a slope", "edge of a slab", "crest of a bank"],
+)
+def test_the_ground_leads_up_to_an_edge_and_passes_below_a_head(height_at, above_m):
+    assert above_sides(*section(height_at))[0] == pytest.approx(above_m, abs=0.002)
+
+
+def test_a_side_that_is_not_seen_does_not_tell_an_edge_from_a_head():
+    xy, height, lines, piece = section(
+        lambda left_m: np.where(np.abs(left_m) < 0.036, 0.05, 0.0), lambda left_m: np.where(left_m > 0.05, 0.0, 1.0)
+    )
+    assert above_sides(xy, height, lines, piece)[0] == pytest.approx(0.05, abs=0.002)
 
 
 def test_axes_that_scatter_are_steadied():
