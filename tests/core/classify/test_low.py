@@ -7,7 +7,7 @@ from rail_extract.core.classify.settings import Settings
 from rail_extract.core.classify.square import classify_square
 from rail_extract.core.classify.tops import Grid
 from rail_extract.core.classify.ways import Way
-from rail_extract.laboratory.scenes.raw_shapes import flat, rough, turned, with_bar
+from rail_extract.laboratory.scenes.raw_shapes import flat, rough, turned
 
 CELL_M, SIDE = 0.04, 120
 SCATTER_M = 0.01
