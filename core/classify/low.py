@@ -99,7 +99,7 @@ def on_low(shown: Shown, settings: Settings) -> Standing:
         of_heads = shown.of(low_enough)
         width_m = Ridges.measure(of_heads.xy, of_heads.height, kept.lines, piece).width_m
         heads = ~(width_m >= settings.head_width_m + tolerances.wider_m)  # where one side is hidden, this is not known
-        heads &= above_sides(of_heads.xy, above_bed[low_enough], kept.lines, piece) > 0
+        heads &= above_sides(of_heads.xy, above_bed[low_enough], kept.lines, piece) >= RISE_M
         kept = fitting(kept, piece, heads, settings, tolerances)
         kept = replace(kept, lines=_on_heads(of_heads, kept.lines, settings.head_width_m))
     cells = cells_beside(grid, kept.lines, (settings.head_width_m - grid.cell_m) / 2)

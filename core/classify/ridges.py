@@ -64,8 +64,12 @@ HALF_WAY = (0.5,)
 """Part of the way down at which the two sides of a ridge are: there, blur does not move the side of a head."""
 
 GROUND_M, GROUND_SEEN = (0.10, 0.30), 0.5
-"""Distances from the axis between which the ground on one side of a ridge shows its slope, and share of the bins there
-that must be seen: from beyond the head and its blurred side on."""
+"""Distances from the axis between which the ground on one side of a ridge shows its slope, from beyond the head and its
+blurred side on, and share of the bins there that must be seen."""
+
+LIT_SHARE = 0.75
+"""Least share of the points of the other side from which a bin shows the ground. Where fewer are, a part of them is of
+beams that also meet the head, and their mean is up to 20 mm too high."""
 
 CREST_M = 0.02
 """Distance from the axis up to which the top of a ridge is its crest: half a head, less the error of the axis."""
@@ -152,7 +156,7 @@ def above_sides(xy: np.ndarray, height: np.ndarray, lines: Lines, piece: np.ndar
     Points are given by place and height above the bed. The edge of a slab or a shoulder is a crest as well, but the
     ground on one side leads up to it. A side that is not seen does not count; without a crest, the height is NaN.
     """
-    sections, middle = _sections(xy, height, lines, piece), BINS // 2
+    sections, middle = _sections(xy, height, lines, piece, LIT_SHARE), BINS // 2
     out_m = MIDDLES_M[middle:]
     on_crest, beside = out_m < CREST_M, (out_m > GROUND_M[0]) & (out_m < GROUND_M[1])
     sides = sections[:, middle:], sections[:, middle - 1 :: -1]
@@ -243,14 +247,17 @@ def _straight(values: np.ndarray, places_m: np.ndarray) -> tuple[np.ndarray, np.
     return mean, mean - slope * place_m, some / len(places_m)
 
 
-def _sections(xy: np.ndarray, height: np.ndarray, lines: Lines, piece: np.ndarray) -> np.ndarray:
+def _sections(
+    xy: np.ndarray, height: np.ndarray, lines: Lines, piece: np.ndarray, seen: float = SHOWN_SHARE
+) -> np.ndarray:
     """Mean heights of the points beside each piece relative to its line, (pieces, BINS); NaN in bins that are unseen.
 
-    What is in the shadow of a head shows few points, of the beams that also meet its edge: their height is between.
+    What is in the shadow of a head shows few points, of the beams that also meet its edge: their height is between. A
+    bin is seen if it has this share of the points that are as far away on the other side.
     """
     count, rise = _profiles(xy, height, lines, to_one_side(lines, piece), piece)
     with np.errstate(invalid="ignore"):
-        return np.where(count < SHOWN_SHARE * count[:, ::-1], np.nan, rise / count)
+        return np.where(count < seen * count[:, ::-1], np.nan, rise / count)
 
 
 def _profiles(
