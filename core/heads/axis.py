@@ -13,7 +13,7 @@ from scipy.ndimage import maximum_filter1d
 
 from ..rails import Support
 from .edges import EDGE_SIGMA_M, VIEW_STATIONS, Ridge, edge_middles
-from .faces import FLANK_TOP_SIGMA_M, Flank, band_of, beside_faces, find_flank
+from .faces import FLANK_TOP_SIGMA_M, Beside, Flank, band_of, beside_faces, find_flank
 from .head_points import MIN_ON_HEAD, STATION_STEP_M, HeadPoints
 from .level import robust_sigma
 from .roads import MIN_WIDER_M, bands, hidden_edges
@@ -156,7 +156,9 @@ def _of_head(points: HeadPoints, unseen_m: float, by_outline: bool) -> Shown:
         outline = outline_middles(points, shown & (by_edges | (either_end_m == 0)) & free.all(axis=0))
     outlined = np.isfinite(outline.offset)
     wanted = ~outlined & free.all(axis=0)
-    beside = beside_faces(points, wanted)
+    beside = beside_faces(points, wanted & ~outline.aside)
+    aside = beside_faces(points[outline.aside[points.station]], wanted & outline.aside, np.inf)
+    beside = Beside(*(np.where(outline.aside, *pair) for pair in zip(vars(aside).values(), vars(beside).values())))
     which = [outlined, wanted & np.isfinite(beside.offset), by_edges, shown]
     unsure_m = np.hypot(unseen_m, either_end_m)
     by_mean = np.full(len(stations), STATION_STEP_M / unseen_m**2)

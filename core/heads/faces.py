@@ -141,8 +141,8 @@ def find_flank(points: HeadPoints) -> Flank | None:
     return Flank(middle + left_m, best.top_m, sigma_m)
 
 
-def beside_faces(points: HeadPoints, wanted: np.ndarray) -> Beside:
-    """Find the axis by the points of each section of a line that has `wanted` stations, (s,) bool.
+def beside_faces(points: HeadPoints, wanted: np.ndarray, fewer_than: float = MIN_SECTION_POINTS) -> Beside:
+    """Find the axis by the points of each section of a line that has `wanted` stations, (s,) bool, and few points.
 
     Where points are many, sections show their outline, or something that is not a head alone. A scanner passes a rail
     on one side for a while: each section and its neighbours together show which one it is.
@@ -160,7 +160,7 @@ def beside_faces(points: HeadPoints, wanted: np.ndarray) -> Beside:
     parts, own = [], []
     for first, last in borders(head.station, len(wanted), SECTION_POINTS):
         start, end = np.searchsorted(points.station, [first, last])
-        if wanted[first:last].any() and np.count_nonzero(high[start:end]) < MIN_SECTION_POINTS:
+        if wanted[first:last].any() and np.count_nonzero(high[start:end]) < fewer_than:
             parts.append(slice(first, last))
             own.append(np.arange(start, end))
     fits = [_fits(off_band[mine], up[mine], points.width_m) for mine in own]

@@ -382,12 +382,14 @@ class Scores:
     `by_bin`, (2, b), are derivatives of the log-likelihood of a point with respect to the offset and the height, 1/m,
     each less what a wrong value of the other or a wrong slope across would add to it. `per_point` is the information
     about the height that a point has on average, 1/m², and `common_m`, (2,), are the standard errors of both in the
-    section that more points next to a station would not reduce.
+    section that more points next to a station would not reduce. `stray`, (b,), is the probability of a point in a bin to
+    be on no part of the outline.
     """
 
     by_bin: np.ndarray
     per_point: float
     common_m: np.ndarray
+    stray: np.ndarray
 
     @classmethod
     def of(cls, counts: np.ndarray, section: Section, outline: Outline, grid: Grid) -> Scores:
@@ -402,4 +404,5 @@ class Scores:
         known, rates = _rates(section, blurred, used)
         whole = np.linalg.inv(_information(counts[used], section, known, rates, SHARE_DOUBT)).diagonal()[:2]
         chance = 1 / np.maximum(by_bin**2 @ counts, RIDGE[:2])
-        return cls(by_bin, float(by_bin[1] ** 2 @ density), np.sqrt(np.maximum(whole - chance, 0.0)))
+        stray = section.shares[-1] * blurred.parts[-1] / density
+        return cls(by_bin, float(by_bin[1] ** 2 @ density), np.sqrt(np.maximum(whole - chance, 0.0)), stray)

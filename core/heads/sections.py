@@ -165,6 +165,8 @@ class Middles:
         0 where they agree. They are half the distance of two passes of the scanner.
     top, top_information, top_common : (s,) arrays
         Height of the top, and the same about it as about the offset.
+    aside : (s,) bool array
+        Where most points are on no part of the head of their section.
     """
 
     offset: np.ndarray
@@ -175,12 +177,14 @@ class Middles:
     top: np.ndarray
     top_information: np.ndarray
     top_common: np.ndarray
+    aside: np.ndarray
 
     @classmethod
     def unknown(cls, count: int) -> Middles:
         """Return those of stations of which nothing is known."""
         nothing, zero = np.full((4, count), np.nan), np.zeros((4, count))
-        return cls(nothing[0], zero[0], nothing[1], zero[1], zero[2], nothing[2], zero[3], nothing[3])
+        aside = np.zeros(count, dtype=bool)
+        return cls(nothing[0], zero[0], nothing[1], zero[1], zero[2], nothing[2], zero[3], nothing[3], aside)
 
 
 def outline_middles(points: HeadPoints, seen: np.ndarray) -> Middles:
@@ -219,7 +223,8 @@ def outline_middles(points: HeadPoints, seen: np.ndarray) -> Middles:
         pull = _pull(station[here] - first, left[here] > section.place[0], last - first)
         is_sharp = np.exp(section.place[5]) < SHARP_NOISE_M
         if not (is_flat and is_sharp):
-            middles.offset[part] = np.where(seen[part], offset - pull, np.nan)
+            middles.aside[part] = _are_aside(scores.stray[bins[here]], station[here] - first, last - first)
+            middles.offset[part] = np.where(seen[part] & ~middles.aside[part], offset - pull, np.nan)
         if not is_flat:
             middles.top[part] = np.where(seen[part], level[part] + above, np.nan)
         middles.common[part] = np.sqrt(scores.common_m[0] ** 2 + (PULL_DOUBT * pull) ** 2 + SHAPE_SIGMA_M**2)
@@ -427,6 +432,17 @@ def _share(station: np.ndarray, is_left: np.ndarray) -> float:
     part = (station - station[0]) // SHARE_STATIONS
     count, on_left = np.bincount(part), np.bincount(part, is_left)
     return float(np.median(on_left[count > 0] / count[count > 0]))
+
+
+def _are_aside(stray: np.ndarray, station: np.ndarray, count: int) -> np.ndarray:
+    """Return at which stations of a section other things than its head are seen, (count,) bool.
+
+    `stray` is the probability of each point to be on no part of the outline, and `station` where it is. A section may
+    have few points in a part that is seen from the other side, and of a line that is a head's width off.
+    """
+    sums = (np.bincount(station, values, minlength=count) for values in (stray, np.ones(len(stray))))
+    strays, points = (uniform_filter1d(values, COURSE_STATIONS, mode="constant") for values in sums)
+    return strays > MAX_STRAY_SHARE * points
 
 
 def _by_station(
