@@ -6,7 +6,7 @@ docs/method.md sections 6.2 and 6.5.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 
 import numpy as np
 from scipy.ndimage import maximum_filter1d
@@ -156,9 +156,7 @@ def _of_head(points: HeadPoints, unseen_m: float, by_outline: bool) -> Shown:
         outline = outline_middles(points, shown & (by_edges | (either_end_m == 0)) & free.all(axis=0))
     outlined = np.isfinite(outline.offset)
     wanted = ~outlined & free.all(axis=0)
-    beside = beside_faces(points, wanted & ~outline.aside)
-    aside = beside_faces(points[outline.aside[points.station]], wanted & outline.aside, np.inf)
-    beside = Beside(*(np.where(outline.aside, *pair) for pair in zip(vars(aside).values(), vars(beside).values())))
+    beside = _beside(points, wanted, outline.aside)
     which = [outlined, wanted & np.isfinite(beside.offset), by_edges, shown]
     unsure_m = np.hypot(unseen_m, either_end_m)
     by_mean = np.full(len(stations), STATION_STEP_M / unseen_m**2)
@@ -170,6 +168,17 @@ def _of_head(points: HeadPoints, unseen_m: float, by_outline: bool) -> Shown:
         np.select(which, [outline.common, beside.common, EDGE_SIGMA_M, unsure_m]),
         outline,
     )
+
+
+def _beside(points: HeadPoints, wanted: np.ndarray, aside: np.ndarray) -> Beside:
+    """Find the axis by one side of the head, at the `wanted` stations and those of these that are `aside`, (s,) bool.
+
+    These are off the outline of their section: the line may be off the head there, or the scanner on the other side of
+    it, so they are looked at alone, however many points they have.
+    """
+    of_section = beside_faces(points, wanted & ~aside)
+    alone = beside_faces(points[aside[points.station]], wanted & aside, fewer_than=np.inf)
+    return Beside(*(np.where(aside, *both) for both in zip(astuple(alone), astuple(of_section))))
 
 
 def _either_end(points: HeadPoints) -> np.ndarray:

@@ -142,10 +142,10 @@ def find_flank(points: HeadPoints) -> Flank | None:
 
 
 def beside_faces(points: HeadPoints, wanted: np.ndarray, fewer_than: float = MIN_SECTION_POINTS) -> Beside:
-    """Find the axis by the points of each section of a line that has `wanted` stations, (s,) bool, and few points.
+    """Find the axis by the points of each section of a line that has `wanted` stations, (s,) bool.
 
-    Where points are many, sections show their outline, or something that is not a head alone. A scanner passes a rail
-    on one side for a while: each section and its neighbours together show which one it is.
+    Sections have `fewer_than` so many points: others show their outline, or something that is not a head alone. A
+    scanner passes a rail on one side for a while: each section and its neighbours together show which one it is.
     """
     found = Beside(*np.full((3, len(wanted)), np.nan))
     if len(points.t) < LEAST_POINTS:

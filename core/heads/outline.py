@@ -382,8 +382,8 @@ class Scores:
     `by_bin`, (2, b), are derivatives of the log-likelihood of a point with respect to the offset and the height, 1/m,
     each less what a wrong value of the other or a wrong slope across would add to it. `per_point` is the information
     about the height that a point has on average, 1/m², and `common_m`, (2,), are the standard errors of both in the
-    section that more points next to a station would not reduce. `stray`, (b,), is the probability of a point in a bin to
-    be on no part of the outline.
+    section that more points next to a station would not reduce. `stray`, (b,), is the probability of a point to be on
+    no part of the outline.
     """
 
     by_bin: np.ndarray

@@ -166,7 +166,7 @@ class Middles:
     top, top_information, top_common : (s,) arrays
         Height of the top, and the same about it as about the offset.
     aside : (s,) bool array
-        Where most points are on no part of the head of their section.
+        Where most points around are off the outline of their section.
     """
 
     offset: np.ndarray
@@ -435,10 +435,10 @@ def _share(station: np.ndarray, is_left: np.ndarray) -> float:
 
 
 def _are_aside(stray: np.ndarray, station: np.ndarray, count: int) -> np.ndarray:
-    """Return at which stations of a section other things than its head are seen, (count,) bool.
+    """Return at which stations of a section most points around are off its outline, (count,) bool.
 
-    `stray` is the probability of each point to be on no part of the outline, and `station` where it is. A section may
-    have few points in a part that is seen from the other side, and of a line that is a head's width off.
+    `stray` is the probability of each point to be on no part of the outline, and `station` where it is. Far from a
+    tripod, a section has few points, which may be on the other face, and the line may be half a head off.
     """
     sums = (np.bincount(station, values, minlength=count) for values in (stray, np.ones(len(stray))))
     strays, points = (uniform_filter1d(values, COURSE_STATIONS, mode="constant") for values in sums)

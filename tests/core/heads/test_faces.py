@@ -76,6 +76,16 @@ def test_a_section_that_may_be_on_either_face_follows_the_rest_of_its_line():
     assert abs(np.nanmedian(beside.offset[:150])) < 0.006
 
 
+def test_few_points_at_the_end_of_a_section_may_be_on_the_other_face():
+    """Far rails of tripods in worlds 13245 and 13731: the outline of the section would be 3 cm on the wrong side."""
+    (near_t, near, near_up), (far_t, far, far_up) = seen_from_right(3000, 30.0, 1), seen_from_right(60, 10.0, 2)
+    off_m = 0.05  # the line there
+    points = np.append(near_t, far_t + 30), np.append(-near, far + off_m), np.append(near_up, far_up)
+    shown = Axis.of(along(*points, 40.0), UNSEEN).shown
+    assert abs(np.median(shown.offset_m[shown.t < 25])) < 0.003
+    assert np.median(shown.offset_m[shown.t > 32]) == pytest.approx(off_m, abs=0.006)
+
+
 def corner_seen_from_right(count, length_m, seed):
     """Points of a head of whose right side a class of heads keeps the upper corner alone, and a little of the crown."""
     rng = np.random.default_rng(seed)
