@@ -144,8 +144,9 @@ def find_flank(points: HeadPoints) -> Flank | None:
 def beside_faces(points: HeadPoints, wanted: np.ndarray, fewer_than: float = MIN_SECTION_POINTS) -> Beside:
     """Find the axis by the points of each section of a line that has `wanted` stations, (s,) bool.
 
-    Sections have `fewer_than` so many points: others show their outline, or something that is not a head alone. A
-    scanner passes a rail on one side for a while: each section and its neighbours together show which one it is.
+    A section with as many points as `fewer_than` is left out: it shows its outline, or something that is not a head
+    alone. A scanner passes a rail on one side for a while: each section and its neighbours together show which one it
+    is.
     """
     found = Beside(*np.full((3, len(wanted)), np.nan))
     if len(points.t) < LEAST_POINTS:
