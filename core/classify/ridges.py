@@ -158,13 +158,11 @@ def above_sides(xy: np.ndarray, height: np.ndarray, lines: Lines, piece: np.ndar
     """
     sections, middle = _sections(xy, height, lines, piece, LIT_SHARE), BINS // 2
     out_m = MIDDLES_M[middle:]
-    on_crest, beside = out_m < CREST_M, (out_m > GROUND_M[0]) & (out_m < GROUND_M[1])
+    beside = (out_m > GROUND_M[0]) & (out_m < GROUND_M[1])
     sides = sections[:, middle:], sections[:, middle - 1 :: -1]
-    crest_m, _, _ = _straight(
-        np.concatenate([side[:, on_crest] for side in sides], axis=1), np.tile(out_m[on_crest], 2)
-    )
-    grounds = [_straight(side[:, beside], out_m[beside]) for side in sides]
-    rises = [np.where(seen < GROUND_SEEN, np.inf, crest_m - at_axis_m) for _, at_axis_m, seen in grounds]
+    crest_m = _known_mean(sections[:, np.abs(MIDDLES_M) < CREST_M])
+    grounds = [_at_zero(side[:, beside], out_m[beside]) for side in sides]
+    rises = [np.where(seen < GROUND_SEEN, np.inf, crest_m - at_axis_m) for at_axis_m, seen in grounds]
     return np.min(rises, axis=0)
 
 
@@ -232,19 +230,23 @@ def _explained(count: np.ndarray, rise: np.ndarray, crest_m: float, blur_m: floa
     return np.einsum("ki,ki->k", right, np.linalg.solve(normal, right[:, :, None])[:, :, 0])
 
 
-def _straight(values: np.ndarray, places_m: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Fit straight lines to rows of values, (k, n), at places, (n,); NaN values are unknown.
+def _known_mean(values: np.ndarray) -> np.ndarray:
+    """Return the means of rows of values, (k, n), without those that are NaN: (k,), NaN without any."""
+    known = np.isfinite(values)
+    with np.errstate(invalid="ignore"):
+        return np.where(known, values, 0.0).sum(axis=1) / known.sum(axis=1)
 
-    Returns the mean value, NaN without any, the value of the line at 0, and the share of the values that are known,
-    (k,) each.
+
+def _at_zero(values: np.ndarray, places_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Fit straight lines to rows of values, (k, n), at places, (n,), without values that are NaN.
+
+    Returns where each line is at place 0, NaN without values, and the share of the values that are known, (k,) each.
     """
     known = np.isfinite(values)
-    value, some = np.where(known, values, 0.0), known.sum(axis=1)
-    with np.errstate(invalid="ignore"):
-        mean, place_m = value.sum(axis=1) / some, known @ places_m / some
+    mean, place_m = _known_mean(values), _known_mean(np.where(known, places_m, np.nan))
     step_m = np.where(known, places_m - place_m[:, None], 0.0)
-    slope = (value * step_m).sum(axis=1) / np.maximum((step_m**2).sum(axis=1), BIN_M**2)
-    return mean, mean - slope * place_m, some / len(places_m)
+    slope = (np.where(known, values, 0.0) * step_m).sum(axis=1) / np.maximum((step_m**2).sum(axis=1), BIN_M**2)
+    return mean - slope * place_m, known.mean(axis=1)
 
 
 def _sections(

@@ -166,7 +166,7 @@ class Middles:
     top, top_information, top_common : (s,) arrays
         Height of the top, and the same about it as about the offset.
     aside : (s,) bool array
-        Where most points around are off the outline of their section.
+        Where too many of the points around are off the outline of their section.
     """
 
     offset: np.ndarray
@@ -435,7 +435,7 @@ def _share(station: np.ndarray, is_left: np.ndarray) -> float:
 
 
 def _are_aside(stray: np.ndarray, station: np.ndarray, count: int) -> np.ndarray:
-    """Return at which stations of a section most points around are off its outline, (count,) bool.
+    """Return at which stations of a section too many of the points around are off its outline, (count,) bool.
 
     `stray` is the probability of each point to be on no part of the outline, and `station` where it is. Far from a
     tripod, a section has few points, which may be on the other face, and the line may be half a head off.
