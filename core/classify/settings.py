@@ -79,9 +79,6 @@ BURIED = Band(low_m=0.04, depth_share=0.4, slab_m=0.012, shadows=False)
 """Tops of rails, and those of rails that are buried up to the head. A smooth surface shows these, too; a rough one has
 as much relief anywhere."""
 
-FROM_AIR = replace(HEADS, shadows=False)
-"""Tops of rails in a thin cloud, in which few points fill a strip by chance: nothing hides what is beside them."""
-
 DENSE = Tolerances(
     along_m=0.035,
     spread_m=0.045,
@@ -110,7 +107,7 @@ THIN = Tolerances(
     below_share=0.5,
     beside_m=0.035,
     least_m=2 * LEAST_M,
-    band=FROM_AIR,
+    band=HEADS,
     wider_m=0.05,
     wider_single_m=0.04,
 )

@@ -113,13 +113,10 @@ def _standing(shown: Shown, level: np.ndarray, paved: Flush, settings: Settings)
 
 def _clear(shown: Shown, settings: Settings) -> Standing:
     """Find rails that stand clear of their bed: bars as narrow as a head, or the ridges of a blunt cloud."""
-    dense = settings.tolerances(thin=False)
-    found = Candidates.find(shown, dense.band)
+    found = Candidates.find(shown, settings.tolerances(thin=False).band)
     density = density_at(shown.bed.coarse, shown.tops.grid.middles(found.marks))
     thin = density < THIN_PER_M2
     tolerances = settings.tolerances(thin)
-    if tolerances.band != dense.band:
-        found = Candidates.find(shown, tolerances.band)
     kept = free_standing(found, shown.bed, reach_at(density), tolerances, settings)
     if settings.blunt:
         return on_ridges(kept, thin, shown, settings)

@@ -45,7 +45,7 @@ class Band:
 
     Cells that are lower by `depth_share` of the height, or by `DEPTH_M` if that is less, are not part of the top. Tops
     are compared with their surroundings at thresholds `slab_m` apart. With `shadows`, what is not seen may be in a
-    shadow: not in a cloud that is matched from images, and not in a thin one.
+    shadow: not in a cloud that is matched from images.
     """
 
     low_m: float

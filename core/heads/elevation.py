@@ -18,8 +18,8 @@ from ..polyline import Polyline, project
 from ..progress import SILENT, Progress
 from ..rails import RailLine, Support
 from .axis import CELL_M, Axis, unseen_m
+from .faces import above_course
 from .head_points import STATION_STEP_M, HeadPoints, Widths, near_lines, stations_along
-from .level import rough_level
 from .own_level import on_own_level
 from .smoother import BLUNT_HEIGHTS, KNOT_M, SHARP
 from .strips import StripOffsets, measure_strips
@@ -191,7 +191,7 @@ def _top_of(points: HeadPoints, axis: Axis, parameters: ElevationParameters) -> 
     if len(head.t) < MIN_POINTS:
         return None
     if axis.flank is not None:
-        above_m = axis.flank.top_m - np.mean(points.z - rough_level(points.t, points.z))
+        above_m = axis.flank.top_m - np.mean(above_course(points))
         course = smoothed(points.t, points.z + above_m, parameters.smoothing_z_m)
         return Top(course, points, np.zeros(len(points.t)))
     crown = fit_crown(points)

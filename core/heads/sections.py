@@ -21,12 +21,14 @@ from .outline import (
     FACES,
     MIN_NOISE_M,
     RAYS_DEG,
+    START_NOISE_M,
     Grid,
     Outline,
     Scores,
     Section,
     fit_section,
     log_likelihood,
+    start_at,
 )
 
 MIN_SECTION_POINTS = 250
@@ -72,6 +74,9 @@ Lines of sight also explain the flanks of a blunt ridge, by 14 to 33 %; there, t
 
 MAX_SECTION_SHIFT_M = 0.02
 """Largest offset of a section: further off, the other edge of the head is outside the bins."""
+
+ASIDE_STARTS = (-2.0, -1.0, 1.0, 2.0)
+"""Offsets, in half heads, from which heads aside of a line are looked for."""
 
 COURSE_STATIONS = 33
 """Stations, 8.25 m, in whose windows the course of a line about its head is found."""
@@ -210,11 +215,11 @@ def outline_middles(points: HeadPoints, seen: np.ndarray) -> Middles:
             start = None
         else:
             start, head = section, fitted
-        if section.shares[-1] > MAX_STRAY_SHARE or abs(section.place[0]) > MAX_SECTION_SHIFT_M:
-            start = None
+        part = slice(first, last)
+        if section.shares[-1] > MAX_STRAY_SHARE or _is_aside(counts, section, fitted, grid):
+            start, middles.aside[part] = None, True
             continue
         scores = Scores.of(counts, section, fitted.outline, grid)
-        part = slice(first, last)
         (offset, above), (middles.information[part], middles.top_information[part]), (course, _) = _by_station(
             section.place[:2], scores, bins[here], station[here] - first, last - first
         )
@@ -268,6 +273,21 @@ def _fitted(counts: np.ndarray, head: Head, grid: Grid, start: Section | None) -
         width_m = found.width_m + section.place[3]
     settled = abs(width_m - found.width_m) <= least_m and width_m <= MAX_HEAD_WIDTH_M
     return (section, found, width_m) if settled else (first, head, width_m)
+
+
+def _is_aside(counts: np.ndarray, section: Section, head: Head, grid: Grid) -> bool:
+    """Return whether a line is beside its head, as one that was drawn along a face, or along its other side.
+
+    From there, a fit takes the face for the other one, or for noise. A likelier fit begins half a head aside, or a
+    whole one.
+    """
+    if np.exp(section.place[4:6]).max() > START_NOISE_M:
+        starts = (start_at(0.5 * side * head.width_m, head.outline) for side in ASIDE_STARTS)
+        section = max(
+            [section, *(fit_section(counts, head.outline, grid, start) for start in starts)],
+            key=lambda one: log_likelihood(counts, one, head.outline, grid),
+        )
+    return bool(abs(section.place[0]) > MAX_SECTION_SHIFT_M)
 
 
 def _is_flat(left: np.ndarray, up: np.ndarray, head_width_m: float) -> bool:
@@ -375,9 +395,11 @@ def _counted(points: HeadPoints, grid: Grid) -> Iterator[np.ndarray]:
             yield counts
 
 
-def borders(station: np.ndarray, count: int, least: int = MIN_SECTION_POINTS) -> list[tuple[int, int]]:
-    """Divide stations into sections of about VIEW_STATIONS, longer ones where points, at `station`, are fewer."""
-    ends = np.linspace(0, count, max(int(round(count / VIEW_STATIONS)), 1) + 1).astype(int)
+def borders(
+    station: np.ndarray, count: int, least: int = MIN_SECTION_POINTS, usual: int = VIEW_STATIONS
+) -> list[tuple[int, int]]:
+    """Divide stations into sections of about `usual` ones, longer ones where points, at `station`, are fewer."""
+    ends = np.linspace(0, count, max(int(round(count / usual)), 1) + 1).astype(int)
     found, before = [0], np.searchsorted(station, ends)
     for end, points in zip(ends[1:].tolist(), before[1:].tolist()):
         if points - np.searchsorted(station, found[-1]) >= least:

@@ -1,8 +1,10 @@
 """Which tops of cells are narrow."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from rail_extract.core.classify.settings import FROM_AIR, HEADS
+from rail_extract.core.classify.settings import HEADS
 from rail_extract.core.classify.tops import Grid, narrow_tops, tops_of
 
 
@@ -14,7 +16,8 @@ def cells_of(columns, top_m):
 
 
 @pytest.mark.parametrize(
-    ("band", "top_m", "narrow"), [(HEADS, 0.17, True), (HEADS, 0.08, False), (FROM_AIR, 0.17, False)]
+    ("band", "top_m", "narrow"),
+    [(HEADS, 0.17, True), (HEADS, 0.08, False), (replace(HEADS, shadows=False), 0.17, False)],
 )
 def test_two_heads_side_by_side_are_narrow_where_the_ground_may_be_in_their_shadow(band, top_m, narrow):
     """In a switch; stones that are as high as low heads fill as much of what is seen, and from above nothing hides."""
