@@ -216,7 +216,8 @@ def outline_middles(points: HeadPoints, seen: np.ndarray) -> Middles:
         else:
             start, head = section, fitted
         part = slice(first, last)
-        if section.shares[-1] > MAX_STRAY_SHARE or _is_aside(counts, section, fitted, grid):
+        is_other = section.shares[-1] > MAX_STRAY_SHARE or width_m < head_width_m - MAX_WRONG_WIDTH_M
+        if is_other or _is_aside(counts, section, fitted, grid):
             start, middles.aside[part] = None, True
             continue
         scores = Scores.of(counts, section, fitted.outline, grid)

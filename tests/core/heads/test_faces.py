@@ -86,6 +86,15 @@ def test_few_points_at_the_end_of_a_section_may_be_on_the_other_face():
     assert np.median(shown.offset_m[shown.t > 32]) == pytest.approx(off_m, abs=0.006)
 
 
+@pytest.mark.parametrize("mirror", [-1, 1])
+def test_a_line_beside_the_face_that_is_seen_moves_to_the_other_side_of_it(mirror):
+    """In world 13880, a fit from the line took the face for noise, and in 13811 for the other face."""
+    t, across, up = seen_from_right(3000, 40.0, 1)
+    beside_m = 0.05  # the line is right of the right face
+    shown = Axis.of(along(t, mirror * (across + beside_m), up, 40.0), UNSEEN).shown
+    assert np.median(shown.offset_m) == pytest.approx(mirror * beside_m, abs=0.003)
+
+
 def corner_seen_from_right(count, length_m, seed):
     """Points of a head of whose right side a class of heads keeps the upper corner alone, and a little of the crown."""
     rng = np.random.default_rng(seed)
