@@ -121,6 +121,8 @@ SWITCHES = (
     _rule("classify.gaps.MIN_KNOWN", np.inf),
     _rule("clouds.on_heads.BELOW_SHARE", 1.0),
     _rule("squares.steps.told_apart", first),
+    _rule("heads.sections._is_aside", lambda *_: False),
+    _rule("heads.faces.COUNTED", np.inf),
     _rule("heads.sections._are_aside", lambda stray, station, count: np.zeros(count, dtype=bool)),
     _rule("heads.refinement._points_of_arc", lambda *_: np.zeros(2)),
     _rule("heads.refinement.HEEL_SPREAD_M", np.inf),

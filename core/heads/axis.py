@@ -96,12 +96,6 @@ class Axis:
         common_m = course.followed(shown.t, np.where(known, shown.common_m, 0.0), information)
         return cls(course, replace(shown, common_m=common_m), flank, ridge)
 
-    @property
-    def movement_m(self) -> float:
-        """Largest offset of the axis from the line, metres, but for a twentieth of the stations that show it."""
-        known = self.shown.information > 0
-        return float(np.percentile(np.abs(self.course.at(self.shown.t[known])), 95)) if known.any() else 0.0
-
     def support(self, marked: bool) -> Support:
         """Return how well points support the line as it is.
 

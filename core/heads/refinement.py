@@ -25,13 +25,8 @@ from .head_points import HeadPoints, Widths, near_lines, widest
 from .own_level import on_own_level
 from .strips import measure_strips
 
-ROUNDS, MOST_ROUNDS = 3, 6
-"""Rounds of moving lines, and how many there are while lines do not settle: one that was drawn along a face that a far
-scanner sees moves by half a head, and only there the points show its outline."""
-
-SETTLED_M = 0.01
-"""Movement of a line in a round, at 95 % of its stations, below which it has settled. In five of six random worlds that
-were not scanned from tripods, every line moves by less in the third round."""
+ROUNDS = 3
+"""Rounds of moving lines."""
 
 ALIGNED_ROUNDS = 2
 """Further rounds in which strips are aligned: a step of 30 mm where strips meet has been drawn as a bend 2 m long, of
@@ -90,14 +85,12 @@ def refine(
     of a head. Lines that met in a node still do, and branches begin where they touch the rail that they leave.
     """
     by_x = points.xyz[np.argsort(points.xyz[:, 0])] if len(network.passes) else points.xyz
-    shares = progress.split(MOST_ROUNDS + (ALIGNED_ROUNDS if align and points.strips is not None else 0))
-    for number, share in enumerate(shares[:MOST_ROUNDS]):
-        network, moved_m = _shifted(network, points, head_width_m, smoothing_m, cell_m, share, by_outline=number > 0)
+    shares = progress.split(ROUNDS + (ALIGNED_ROUNDS if align and points.strips is not None else 0))
+    for number, share in enumerate(shares[:ROUNDS]):
+        network = _shifted(network, points, head_width_m, smoothing_m, cell_m, share, by_outline=number > 0)
         network = slide_branches(network, by_x, widest(head_width_m), bool(points.blunt))
-        if number + 1 >= ROUNDS and moved_m < SETTLED_M:
-            break
-    for share in shares[MOST_ROUNDS:]:
-        network, _ = _shifted(network, points, head_width_m, smoothing_m, cell_m, share, align=True)
+    for share in shares[ROUNDS:]:
+        network = _shifted(network, points, head_width_m, smoothing_m, cell_m, share, align=True)
     return network
 
 
@@ -110,17 +103,16 @@ def _shifted(
     progress: Progress,
     by_outline: bool = True,
     align: bool = False,
-) -> tuple[LineNetwork, float]:
-    """Move every line to the middle of its head, and the nodes with them; also say how far one moves, metres."""
+) -> LineNetwork:
+    """Move every line to the middle of its head, and the nodes with them."""
     near = near_lines(network.lines, points, widths, progress.span(0.0, 0.7))
-    lines, moved_m = [], 0.0
+    lines = []
     for line, head in zip(network.lines, progress.span(0.7, 1.0).follow(near)):
         strips = measure_strips(head) if by_outline else None
         own = on_own_level(strips.moved(head, align) if strips else head)
         axis = Axis.of(own, unseen_m(cell_m), by_outline)
         lines.append(line + axis.course.at(own.along)[:, None] * Polyline(line).normals)
-        moved_m = max(moved_m, axis.movement_m)
-    return _joined(network, lines, smoothing_m), moved_m
+    return _joined(network, lines, smoothing_m)
 
 
 def _joined(network: LineNetwork, lines: list[np.ndarray], smoothing_m: float) -> LineNetwork:
