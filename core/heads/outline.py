@@ -275,7 +275,7 @@ def fit_section(counts: np.ndarray, outline: Outline, grid: Grid, start: Section
     Shares follow by expectation maximization, the place together with the shares by Fisher scoring. `start` is an
     estimate, such as that of the section before.
     """
-    section = start if start is not None else start_at(0.0, outline)
+    section = start if start is not None else _start(outline)
     used = counts > 0
     blurred = Blurred.at(section.place, outline, grid)
     best = -np.inf
@@ -300,11 +300,11 @@ def log_likelihood(counts: np.ndarray, section: Section, outline: Outline, grid:
     return _log_likelihood(counts, section, Blurred.at(section.place, outline, grid))
 
 
-def start_at(left_m: float, outline: Outline) -> Section:
-    """Return a head whose axis is `left_m` to the left of the middle of the bins; all parts have the same share."""
+def _start(outline: Outline) -> Section:
+    """Return a head in the middle of the bins, all parts of which have the same share."""
     count = len(outline.parts) + 1
     noise = np.log(START_NOISE_M)
-    return Section(np.array([left_m, 0.0, 0.0, 0.0, noise, noise, 0.0]), np.full(count, 1 / count))
+    return Section(np.array([0.0, 0.0, 0.0, 0.0, noise, noise, 0.0]), np.full(count, 1 / count))
 
 
 def _log_likelihood(counts: np.ndarray, section: Section, blurred: Blurred) -> float:

@@ -21,14 +21,12 @@ from .outline import (
     FACES,
     MIN_NOISE_M,
     RAYS_DEG,
-    START_NOISE_M,
     Grid,
     Outline,
     Scores,
     Section,
     fit_section,
     log_likelihood,
-    start_at,
 )
 
 MIN_SECTION_POINTS = 250
@@ -75,9 +73,6 @@ Lines of sight also explain the flanks of a blunt ridge, by 14 to 33 %; there, t
 MAX_SECTION_SHIFT_M = 0.02
 """Largest offset of a section: further off, the other edge of the head is outside the bins."""
 
-ASIDE_STARTS = (-2.0, -1.0, 1.0, 2.0)
-"""Offsets, in half heads, from which heads aside of a line are looked for."""
-
 COURSE_STATIONS = 33
 """Stations, 8.25 m, in whose windows the course of a line about its head is found."""
 
@@ -85,7 +80,8 @@ WRONG_WIDTH_M = 0.004
 """Error of the width above which another outline is fitted: standards differ by a millimetre."""
 
 MAX_WRONG_WIDTH_M = 0.015
-"""Error of the width above which the points show something else than a head."""
+"""Error of the width above which the points show something else than a head, or one beside which the line is: from
+there, a fit takes a face for the other one, and the head for one that is 20 to 36 mm narrower."""
 
 MAX_HEAD_WIDTH_M = 0.078
 """Widest head that is fitted: the widest of the standards has 77.8 mm. Heads that are flat to their edges look 10 mm
@@ -216,8 +212,8 @@ def outline_middles(points: HeadPoints, seen: np.ndarray) -> Middles:
         else:
             start, head = section, fitted
         part = slice(first, last)
-        is_other = section.shares[-1] > MAX_STRAY_SHARE or width_m < head_width_m - MAX_WRONG_WIDTH_M
-        if is_other or _is_aside(counts, section, fitted, grid):
+        is_head = section.shares[-1] <= MAX_STRAY_SHARE and width_m >= head_width_m - MAX_WRONG_WIDTH_M
+        if not is_head or abs(section.place[0]) > MAX_SECTION_SHIFT_M:
             start, middles.aside[part] = None, True
             continue
         scores = Scores.of(counts, section, fitted.outline, grid)
@@ -274,21 +270,6 @@ def _fitted(counts: np.ndarray, head: Head, grid: Grid, start: Section | None) -
         width_m = found.width_m + section.place[3]
     settled = abs(width_m - found.width_m) <= least_m and width_m <= MAX_HEAD_WIDTH_M
     return (section, found, width_m) if settled else (first, head, width_m)
-
-
-def _is_aside(counts: np.ndarray, section: Section, head: Head, grid: Grid) -> bool:
-    """Return whether a line is beside its head, as one that was drawn along a face, or along its other side.
-
-    From there, a fit takes the face for the other one, or for noise. A likelier fit begins half a head aside, or a
-    whole one.
-    """
-    if np.exp(section.place[4:6]).max() > START_NOISE_M:
-        starts = (start_at(0.5 * side * head.width_m, head.outline) for side in ASIDE_STARTS)
-        section = max(
-            [section, *(fit_section(counts, head.outline, grid, start) for start in starts)],
-            key=lambda one: log_likelihood(counts, one, head.outline, grid),
-        )
-    return bool(abs(section.place[0]) > MAX_SECTION_SHIFT_M)
 
 
 def _is_flat(left: np.ndarray, up: np.ndarray, head_width_m: float) -> bool:
