@@ -177,7 +177,7 @@ def _beside(points: HeadPoints, wanted: np.ndarray, aside: np.ndarray) -> Beside
     it, so they are looked at alone, however many points they have.
     """
     of_section = beside_faces(points, wanted & ~aside)
-    alone = beside_faces(points[aside[points.station]], wanted & aside, np.inf)
+    alone = beside_faces(points[aside[points.station]], wanted & aside, fewer_than=np.inf)
     return Beside(*(np.where(aside, *both) for both in zip(astuple(alone), astuple(of_section))))
 
 

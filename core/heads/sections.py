@@ -167,7 +167,7 @@ class Middles:
     top, top_information, top_common : (s,) arrays
         Height of the top, and the same about it as about the offset.
     aside : (s,) bool array
-        Where too many of the points around are off the outline of their section.
+        Where too many of the points around are off the outline of their section, or the line is beside its head.
     """
 
     offset: np.ndarray
