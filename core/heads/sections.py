@@ -21,6 +21,7 @@ from .outline import (
     FACES,
     MIN_NOISE_M,
     RAYS_DEG,
+    START_NOISE_M,
     Grid,
     Outline,
     Scores,
@@ -81,7 +82,8 @@ WRONG_WIDTH_M = 0.004
 
 MAX_WRONG_WIDTH_M = 0.015
 """Error of the width above which the points show something else than a head, or one beside which the line is: from
-there, a fit takes a face for the other one, and the head for one that is 20 to 36 mm narrower."""
+there, a fit takes a face for the other one, and the head for a sharp one that is 20 to 36 mm narrower. Passes that are
+2 cm apart look as narrow, but blurred."""
 
 MAX_HEAD_WIDTH_M = 0.078
 """Widest head that is fitted: the widest of the standards has 77.8 mm. Heads that are flat to their edges look 10 mm
@@ -212,8 +214,8 @@ def outline_middles(points: HeadPoints, seen: np.ndarray) -> Middles:
         else:
             start, head = section, fitted
         part = slice(first, last)
-        is_head = section.shares[-1] <= MAX_STRAY_SHARE and width_m >= head_width_m - MAX_WRONG_WIDTH_M
-        if not is_head or abs(section.place[0]) > MAX_SECTION_SHIFT_M:
+        is_narrow = width_m < head_width_m - MAX_WRONG_WIDTH_M and np.exp(section.place[4:6]).max() < START_NOISE_M
+        if is_narrow or section.shares[-1] > MAX_STRAY_SHARE or abs(section.place[0]) > MAX_SECTION_SHIFT_M:
             start, middles.aside[part] = None, True
             continue
         scores = Scores.of(counts, section, fitted.outline, grid)
