@@ -237,7 +237,7 @@ def _fits(across: np.ndarray, up: np.ndarray, head_width_m: float) -> list[_Fit]
         head = up > top_m + section.place[1] - FACE_DEPTH_M - NEAR_HEAD_M
         beside = np.mean(-side * (across[head] - axis_m) >= half_m - CORNER_RADIUS_M) if side and head.any() else 0.0
         shares = (outside + stray * counts.sum()) / len(up), float(beside)
-        noise_m = float(np.exp(section.place[4:6].max()))
+        noise_m = float(section.noise_m.max())
         fits.append(_Fit(likelihood, axis_m, top_m + float(section.place[1]), side, *shares, noise_m))
     best = {fit.side: fit for fit in sorted(fits, key=lambda fit: fit.likelihood)}
     return sorted(best.values(), key=lambda fit: -fit.likelihood)

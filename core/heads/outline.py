@@ -218,6 +218,11 @@ class Section:
     place: np.ndarray
     shares: np.ndarray
 
+    @property
+    def noise_m(self) -> np.ndarray:
+        """Noise across and in height, (2,) metres."""
+        return np.exp(self.place[4:6])
+
 
 @dataclass(frozen=True)
 class Blurred:

@@ -214,7 +214,7 @@ def outline_middles(points: HeadPoints, seen: np.ndarray) -> Middles:
         else:
             start, head = section, fitted
         part = slice(first, last)
-        is_narrow = width_m < head_width_m - MAX_WRONG_WIDTH_M and np.exp(section.place[4:6]).max() < START_NOISE_M
+        is_narrow = width_m < head_width_m - MAX_WRONG_WIDTH_M and section.noise_m.max() < START_NOISE_M
         if is_narrow or section.shares[-1] > MAX_STRAY_SHARE or abs(section.place[0]) > MAX_SECTION_SHIFT_M:
             start, middles.aside[part] = None, True
             continue
@@ -225,7 +225,7 @@ def outline_middles(points: HeadPoints, seen: np.ndarray) -> Middles:
         is_crowned = _is_crowned(left[here], up[here], head_width_m)
         is_flat = not is_crowned and _is_flat(left[here] - section.place[0], up[here], head_width_m)
         pull = _pull(station[here] - first, left[here] > section.place[0], last - first)
-        is_sharp = np.exp(section.place[5]) < SHARP_NOISE_M
+        is_sharp = section.noise_m[1] < SHARP_NOISE_M
         if not (is_flat and is_sharp):
             middles.aside[part] = _are_aside(scores.stray[bins[here]], station[here] - first, last - first)
             middles.offset[part] = np.where(seen[part] & ~middles.aside[part], offset - pull, np.nan)
@@ -328,7 +328,7 @@ def _blur(section: Section, wider_m: float, offset: np.ndarray, apart_up_m: floa
     Where the line wanders about the head, by its `offset`, (k,) metres, it blurs the section as well, and so do passes
     in height, by `apart_up_m`. A head that is flat to its edges looks both blurred and wider, by `wider_m`.
     """
-    across_m, height_m = np.exp(section.place[4:6])
+    across_m, height_m = section.noise_m
     known = offset[np.isfinite(offset)]
     if len(known) and np.sqrt(np.mean(known**2)) > ON_HEAD_M:
         return 0.0

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from rail_extract.core.heads.axis import Axis
-from rail_extract.core.heads.faces import beside_faces, find_flank
+from rail_extract.core.heads.faces import FLANK_SIGMA_M, beside_faces, find_flank
 from rail_extract.core.heads.head_points import HeadPoints, stations_along
 
 WIDTH, UNSEEN, NOISE_M = 0.072, 0.04 / np.sqrt(12), 0.002
@@ -69,7 +69,7 @@ def test_a_section_that_may_be_on_either_face_follows_the_rest_of_its_line():
     t, across, up = seen_from_right(140, 40.0, 4)
     wanted = np.ones(len(stations_along(80.0)), dtype=bool)
     alone = beside_faces(along(face_t, face, below, 40.0), wanted[:160])
-    assert np.nanmedian(alone.common) == pytest.approx(WIDTH / 2, rel=0.001)
+    assert np.nanmedian(alone.common) == pytest.approx(np.hypot(WIDTH / 2, FLANK_SIGMA_M), rel=1e-4)
     both = along(np.append(face_t, t + 40), np.append(face, across), np.append(below, up), 80.0)
     beside = beside_faces(both, wanted)
     assert np.nanmax(beside.common) < 0.01
