@@ -13,12 +13,13 @@ from pathlib import Path
 import numpy as np
 
 from ..classify.guide import MIDDLE_M, Guide
+from ..classify.level import on_one_level
 from ..classify.settings import MARGIN_M, Settings, Way
 from ..classify.square import Classified, classify_square
 from ..classify.tops import LOW_M
 from ..classify.ways import any_sharp, blunt_among, search_alike, searched_alone
 from ..clouds.passes import sources_of
-from ..clouds.points import Request, read_each
+from ..clouds.points import Request, read_each, strips_of
 from ..clouds.readers import CloudHeader, read_points
 from ..errors import CloudError, NoRailPointsError, ParameterError
 from ..frame import LocalFrame
@@ -297,7 +298,8 @@ def _search(
     points = read_stored(files, POINT)
     if sources is not None:
         points = points[np.isin(sources_of(points["mark"]), sorted(sources))]
-    found = search_square(square.frame.to_local(points["xyz"]), settings, context)
+    xyz = square.frame.to_local(points["xyz"])
+    found = search_square(on_one_level(xyz, strips_of(xyz, points["mark"])), settings, context)
     points = points[found.rail]
     return Found(points["xyz"].copy(), points["number"].copy(), points["mark"].copy(), found.figures)
 
