@@ -23,7 +23,7 @@ from .cells import (
 )
 from .labels import Near, label, whole_heads
 from .lines import Marks
-from .partner import MAJORITY, SPACING_M, have_partners, rise_above, runs_inside
+from .partner import MAJORITY, SPACING_M, have_partners, partner_sides, rise_above, runs_inside
 from .pieces import LEAST_SINGLE_M, cross_over, lengths, mean_of, pieces_of, with_partner
 from .ridges import Ridges
 from .settings import Settings, Tolerances
@@ -89,7 +89,7 @@ def on_bars(
     width_m, share_m = beside.widths(kept.lines, piece), own_lengths(kept, settings)
     narrow = (width_m < settings.head_width_m + tolerances.wider_m)[piece]
     kinds = _by_shape(kept, piece, width_m, narrow, shown, settings)
-    clear = kinds[0] & (mean_of(kept.lines.height, piece) >= CLEAR_M)[piece]
+    clear = (kinds[0] | kinds[2]) & (mean_of(kept.lines.height, piece) >= CLEAR_M)[piece]
     sharp_m, round_m, unsure_m, clear_m = (float(share_m[kind].sum()) for kind in (*kinds, clear))
     kept = _with_kept_partners(kept.of(narrow), settings, tolerances)
     beside = Near.find(shown.xy[chosen], kept.lines)
@@ -152,7 +152,7 @@ def _are_rails(
     """
     partnered = with_partner(kept.pairs, kept.paired)
     piece = pieces_of(len(kept.cell), kept.pairs)
-    others = _are_guards(kept, shown.tops.z.ravel()[kept.cell], settings)
+    others = _are_guards(kept, shown.tops.z.ravel()[kept.cell], settings, tolerances.partner_m)
     others |= _are_beyond(kept, piece, partnered & ~others, settings, tolerances.partner_m)
     partnered &= ~others
     if partnered.all():
@@ -195,12 +195,13 @@ def _are_beyond(
     return partnered & ~certain & (off_m > AS_HIGH_M)[piece]
 
 
-def _are_guards(kept: Kept, z: np.ndarray, settings: Settings) -> np.ndarray:
+def _are_guards(kept: Kept, z: np.ndarray, settings: Settings, height_m: float) -> np.ndarray:
     """Return which cells are of guard or third rails of a longer one, or of one with a partner, (n,) bool.
 
     A guard rail is as high as the rail within a gauge that it guards; it ends before that, and hides it from a scanner
     beside the track, so that the rail seems to go on as the guard rail. A third rail is higher and at most a little
-    further away than the other rail.
+    further away than the other rail; what is as far from a track on its outer side is a rail of the next one.
+    `height_m` is the largest difference of partners.
     """
     lines = kept.lines
     pairs = kept.pairs[~cross_over(lines)[kept.pairs].any(axis=1)]
@@ -216,5 +217,12 @@ def _are_guards(kept: Kept, z: np.ndarray, settings: Settings) -> np.ndarray:
         return np.minimum(*(np.abs(one[own] - one[rail]) for one in (lines.height, z))) < AS_HIGH_M
 
     guards = inside(SPACING_M, as_high)
-    thirds = inside(THIRD_RAIL_M, lambda own, rail: rise_above(lines, rail, own, rail) > HIGHER_M)
+    to_partner = partner_sides(lines, settings.spacings_m, height_m)
+
+    def higher(own: np.ndarray, rail: np.ndarray) -> np.ndarray:
+        left_m = np.einsum("ij,ij->i", lines.axis[own] - lines.axis[rail], lines.across[rail])
+        outside = left_m * to_partner[rail] < -THIRD_RAIL_M
+        return (rise_above(lines, rail, own, rail) > HIGHER_M) & ~outside
+
+    thirds = inside(THIRD_RAIL_M, higher)
     return ((mean_of(guards, piece) > MAJORITY) | (mean_of(thirds, piece) > MAJORITY))[piece]

@@ -60,6 +60,18 @@ def have_partners(lines: Lines, spacings_m: Sequence[float], height_m: float, wo
     return np.max(stations, axis=0) >= MIN_STATIONS
 
 
+def partner_sides(lines: Lines, spacings_m: Sequence[float], height_m: float) -> np.ndarray:
+    """Return where each cell's partner is at the best of the distances of the two heads, (n,): see `have_partners`.
+
+    1 if it is to the left, -1 to the right, and 0 without one.
+    """
+    most, sides = np.full(len(lines.axis), MIN_STATIONS - 1), np.zeros(len(lines.axis), dtype=np.int64)
+    for spacing_m in spacings_m:
+        stations, side, _ = partners(lines, spacing_m, SPACING_M, height_m)
+        sides, most = np.where(stations > most, side, sides), np.maximum(stations, most)
+    return sides
+
+
 def off_gauge(lines: Lines, spacings_m: Sequence[float], tolerance_m: float, height_m: float) -> np.ndarray:
     """Return how much the distance of each cell's line from its partner differs from the best of those of two heads.
 
