@@ -1,7 +1,7 @@
 """Heads that stand just out of a rough bed, by what is higher than both of its sides over more than a metre.
 
-The stones of a track that is filled with ballast scatter by as much as its heads stand out, but a line of some twenty
-cells averages them. How much its mean differs from those beside it is therefore compared with what the cells scatter.
+The stones of a track that is filled with ballast scatter by as much as its heads stand out, but a line of tens
+of cells averages them. How much its mean differs from those beside it is compared with what the cells scatter.
 """
 
 from __future__ import annotations
@@ -20,11 +20,16 @@ from .ridges import Ridges, above_sides, cells_beside, on_crests
 from .settings import Settings
 from .tops import EMPTY, MILLIMETRES, WINDOW_M, Grid
 
-DOUBLINGS = 5
-"""A line has 2 to this power of cells, 1.3 m: arcs of 25 m bend by 8 mm over it, and sleepers and stones alternate."""
+DOUBLINGS = (5, 6)
+"""Lines have 2 to these powers of cells: 1.3 and 2.6 m. The shorter one counts if it is certain, because rails bend and
+part: arcs of 25 m bend by 8 mm over it. Where a head stands out by 3 cm, and stones by half as much, or where profiles
+of a scanner are far apart, only the longer one is certain; over 5.2 m, furrows are as well."""
 
-DIRECTIONS = 24
-"""Directions of lines, 7.5 degrees apart: one between two of them is half a head off at its ends."""
+DIRECTIONS_PER_CELL = 0.75
+"""Directions of lines, by their cells: one between two of them is half a head off at its ends."""
+
+MARGIN = 2 ** max(DOUBLINGS)
+"""Cells around a raster: half of the longest line and its sides take fewer."""
 
 BESIDE_M = (0.11, 0.15, 0.19)
 """Distances of the lines on a side from the line between them: from beyond the head to the next head or its foot."""
@@ -47,11 +52,12 @@ CLIPPED_M = 0.04
 NOISE_M = 0.003
 """Least scatter of the cells of a line, the noise of a scanner: a few cells may be level by chance."""
 
-CERTAIN = 4.5
-"""Least rise of a line by its standard error: chance is a third of it over all directions, and rails twice of it."""
+CERTAIN, HINT = 4.5, 1.5
+"""Least rise of a line by its standard error: chance is a third of it over all directions, and rails twice of it. From
+the second number on, a line that is twice as long may be certain."""
 
-CREST_CELLS = 2
-"""Cells to either side than which a crest is not lower: a head is as wide."""
+CREST_CELLS = 3
+"""Cells to either side that are not more certain than a crest: lines beside a head cross it at small angles."""
 
 ON_HEAD_M = 0.10
 """Distance from an axis up to which points show where its head is: half a head, the 3 cm by which axes of cells are
@@ -119,11 +125,11 @@ def _on_heads(shown: Shown, lines: Lines, head_width_m: float) -> Lines:
 def find_low(grid: Grid, level: np.ndarray) -> Low:
     """Find the lines that stand out, given the mean height of each cell above the bed; NaN without points."""
     surface = _surface(level, grid)
-    level = np.clip(level - surface, -CLIPPED_M, CLIPPED_M)
-    certain, rise, base, direction = _most_certain(level, grid.cell_m)
-    certain = np.where(np.isfinite(level), certain, 0.0)
-    crest = (certain >= CERTAIN) & (np.nan_to_num(rise) >= RISE_M)
-    return Low(rise, base + surface, crest & _are_crests(certain, direction))
+    rises = Rises.of(np.clip(level - surface, -CLIPPED_M, CLIPPED_M), grid.cell_m)
+    rise, base, crest = np.full(level.shape, np.nan), np.full(level.shape, np.nan), np.zeros(level.shape, dtype=bool)
+    rise.flat[rises.cells], base.flat[rises.cells] = rises.found[1:3]
+    crest.flat[rises.cells] = rises.are_crests(level.shape)
+    return Low(rise, base + surface, crest)
 
 
 def _surface(level: np.ndarray, grid: Grid) -> np.ndarray:
@@ -139,45 +145,125 @@ def _surface(level: np.ndarray, grid: Grid) -> np.ndarray:
     return surface
 
 
-def _most_certain(level: np.ndarray, cell_m: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Compare the line through each cell with those beside it, in the direction in which it is most certainly higher.
+@dataclass(frozen=True)
+class Rises:
+    """The line through each of some `cells`, (k,) numbers, that is most certainly above both of its sides.
 
-    Returns, (rows, columns) each, the rise by its standard error, the rise, the height of the higher side, and the
-    number of the direction; 0, NaN, NaN and 0 where no line is seen.
+    `found`, (4, k), has its rise by the standard error of this, 0 where no line is seen, its rise and its base, see
+    `Low`, and its direction, radians.
     """
-    seen = np.isfinite(level)
-    value = np.where(seen, level, 0.0)
-    images = np.stack([seen, value, value * value]).astype(np.float32)
-    certain, direction = np.zeros(level.shape, dtype=np.float32), np.zeros(level.shape, dtype=np.int8)
-    rise, base = np.full_like(certain, np.nan), np.full_like(certain, np.nan)
-    for number in range(DIRECTIONS):
-        down, right = _step(number)
-        line = Sample(*_along(images, down, right))
-        ways = [(side * right / cell_m, -side * down / cell_m) for side in (1, -1)]
-        sides = [Sample(*_beside(line, *way)) for way in ways]
-        hidden = [_hidden(side, other, way) for side, other, way in zip(sides, sides[::-1], ways)]
-        above = [np.where(dark, np.inf, line.certainly_above(side)) for dark, side in zip(hidden, sides)]
-        least = np.min(above, axis=0)
-        better = least > certain
-        certain[better], direction[better] = least[better], number
-        base[better] = np.max([np.where(dark, -np.inf, side.mean) for dark, side in zip(hidden, sides)], axis=0)[better]
-        rise[better] = line.mean[better] - base[better]
-    return certain, rise, base, direction
+
+    cells: np.ndarray
+    found: np.ndarray
+
+    @classmethod
+    def of(cls, level: np.ndarray, cell_m: float) -> Rises:
+        """Compare the line through each cell that has a height, (rows, columns) metres, with those beside it."""
+        padded, cells = Padded.around(level, cell_m), np.flatnonzero(np.isfinite(level))
+        found, undecided = np.zeros((4, len(cells))), np.arange(len(cells))
+        for doublings in DOUBLINGS:
+            found[:, undecided] = padded.most_certain(cells[undecided], doublings)
+            certain = found[0, undecided]
+            undecided = undecided[(certain >= HINT) & (certain < CERTAIN)]
+        return cls(cells, found)
+
+    def are_crests(self, shape: tuple[int, int]) -> np.ndarray:
+        """Return which cells of a raster are certain, and more so than those within `CREST_CELLS` across, (k,) bool."""
+        certain, rise, _, angle = self.found
+        around = np.pad(np.zeros(shape), CREST_CELLS)
+        row, column = (one + CREST_CELLS for one in np.divmod(self.cells, shape[1]))
+        around[row, column] = certain
+        crests = (certain >= CERTAIN) & (rise >= RISE_M)
+        for across in (*range(-CREST_CELLS, 0), *range(1, CREST_CELLS + 1)):
+            down, right = (np.round(across * way).astype(np.int64) for way in (np.cos(angle), np.sin(angle)))
+            crests &= certain >= around[row + down, column + right]
+        return crests
 
 
-def _hidden(side: Sample, other: Sample, way: tuple[float, float]) -> np.ndarray:
-    """Return where a side is in shadow, by the other one, (rows, columns) bool: not beyond the border of the raster.
+@dataclass(frozen=True)
+class Padded:
+    """A raster in a margin in which nothing is seen, row after row: a step to another cell is a number of cells.
 
-    A metre to this side is as many rows down and columns to the right as `way` says.
+    `images`, (3, n), are 1, height and its square where a cell has a height, and 0 elsewhere; `inside`, (n,) bool, is
+    the raster without its margin. A row has `columns` cells in the raster, and `width` with the margin.
     """
-    inside = _moved(np.ones(side.count.shape, dtype=bool), BESIDE_M[-1] * way[0], BESIDE_M[-1] * way[1])
-    return inside & (SHADOW * side.count < other.count)
 
+    images: np.ndarray
+    inside: np.ndarray
+    columns: int
+    width: int
+    cell_m: float
 
-def _step(number: int) -> tuple[float, float]:
-    """Rows and columns from one cell of a line to the next one, in a direction."""
-    angle = np.pi * number / DIRECTIONS
-    return -float(np.sin(angle)), float(np.cos(angle))
+    @classmethod
+    def around(cls, level: np.ndarray, cell_m: float) -> Padded:
+        """Put a margin around heights, (rows, columns) metres."""
+        seen = np.isfinite(level)
+        value = np.where(seen, level, 0.0)
+        images = np.stack([seen, value, value * value, np.ones(level.shape)]).astype(np.float32)
+        padded = np.pad(images, ((0, 0), (MARGIN, MARGIN), (0, MARGIN)))
+        flat = padded.reshape(len(images), -1)
+        return cls(flat[:3], flat[3] > 0, level.shape[1], padded.shape[2], cell_m)
+
+    def most_certain(self, cells: np.ndarray, doublings: int) -> np.ndarray:
+        """Find the most certain of the lines of 2 to the power of `doublings` cells through some cells, (k,).
+
+        Returns (4, k), see `Rises`.
+        """
+        row, column = np.divmod(cells, self.columns)
+        places, best = (row + MARGIN) * self.width + column, np.full((4, len(cells)), np.nan)
+        best[[0, 3]] = 0.0
+        directions = round(DIRECTIONS_PER_CELL * 2**doublings)
+        spare = np.zeros_like(self.images), np.zeros_like(self.images)
+        for angle in np.pi * np.arange(directions) / directions:
+            down, right = -float(np.sin(angle)), float(np.cos(angle))
+            sums, start = self._along(down, right, doublings, spare)
+            certain, rise, base = self._compared(sums, start, places, down, right)
+            better = certain > best[0]
+            best[:3, better] = certain[better], rise[better], base[better]
+            best[3, better] = angle
+        return best
+
+    def _along(
+        self, down: float, right: float, doublings: int, spare: tuple[np.ndarray, np.ndarray]
+    ) -> tuple[np.ndarray, int]:
+        """Sum images along lines in a direction: sums of 1, 2, 4 … cells add up.
+
+        Sums are where a line begins; also returns the step to there from its middle. `spare` gets two of the sums.
+        """
+        sums, length = self.images, 1
+        for number in range(doublings):
+            step, further = self._step(length * down, length * right), spare[number % 2]
+            here, ahead = slice(max(-step, 0), min(-step, 0) or None), slice(max(step, 0), min(step, 0) or None)
+            np.add(sums[:, here], sums[:, ahead], out=further[:, here])
+            sums, length = further, 2 * length
+        return sums, self._step(-(length - 1) / 2 * down, -(length - 1) / 2 * right)
+
+    def _compared(
+        self, sums: np.ndarray, start: int, places: np.ndarray, down: float, right: float
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Compare the lines through some places, (k,), with those beside them; see `Rises`."""
+        line = self._sample(sums, places + start)
+        cells = [beside_m / self.cell_m for beside_m in BESIDE_M]
+        steps = [[self._step(way * far * right, -way * far * down) for far in cells] for way in (1, -1)]
+        sides = [self._sample(sums, *(places + start + step for step in ways)) for ways in steps]
+        # What is beyond the border of the raster is not in shadow.
+        hidden = [
+            self.inside[places + ways[-1]] & (SHADOW * side.count < other.count)
+            for ways, side, other in zip(steps, sides, sides[::-1])
+        ]
+        certain = np.min(
+            [np.where(dark, np.inf, line.certainly_above(side)) for dark, side in zip(hidden, sides)], axis=0
+        )
+        base = np.max([np.where(dark, -np.inf, side.mean) for dark, side in zip(hidden, sides)], axis=0)
+        return certain, line.mean - base, base
+
+    def _sample(self, sums: np.ndarray, *starts: np.ndarray) -> Sample:
+        """Take the lines that begin at places, (k,) each, together; those that begin outside show nothing."""
+        return Sample(*np.sum([np.where(self.inside[start], sums[:, start], 0.0) for start in starts], axis=0))
+
+    def _step(self, down: float, right: float) -> int:
+        """Return the step to a cell, by the rows that it is below and the columns that it is to the right."""
+        return round(down) * self.width + round(right)
 
 
 @dataclass(frozen=True)
@@ -205,43 +291,3 @@ class Sample:
         error = np.sqrt(variance * (1 / np.maximum(self.count, 1) + 1 / np.maximum(side.count, 1)))
         enough = (self.count > LEAST_CELLS - 0.5) & (side.count > 2 * LEAST_CELLS - 0.5)
         return np.where(enough, (self.mean - side.mean) / error, 0.0)
-
-
-def _along(images: np.ndarray, down: float, right: float) -> np.ndarray:
-    """Sum images, (k, rows, columns), along a line through each cell: sums of 1, 2, 4 … cells add up."""
-    total, length = images, 1
-    for _ in range(DOUBLINGS):
-        total = total + _moved(total, length * down, length * right)
-        length *= 2
-    return _moved(total, -(length - 1) / 2 * down, -(length - 1) / 2 * right)
-
-
-def _beside(line: Sample, down: float, right: float) -> list[np.ndarray]:
-    """Sum the lines on one side of each cell, a metre of which is as many rows down and columns to the right."""
-    return [
-        np.sum([_moved(values, beside_m * down, beside_m * right) for beside_m in BESIDE_M], axis=0)
-        for values in (line.count, line.total, line.squares)
-    ]
-
-
-def _moved(image: np.ndarray, down: float, right: float) -> np.ndarray:
-    """Put at each cell the value of the one `down` rows below and `right` columns to the right; 0 beyond the border."""
-    (rows, columns), (row, column) = image.shape[-2:], (round(down), round(right))
-    moved = np.zeros_like(image)
-    if abs(row) < rows and abs(column) < columns:
-        moved[..., max(-row, 0) : rows - max(row, 0), max(-column, 0) : columns - max(column, 0)] = image[
-            ..., max(row, 0) : rows - max(-row, 0), max(column, 0) : columns - max(-column, 0)
-        ]
-    return moved
-
-
-def _are_crests(certain: np.ndarray, direction: np.ndarray) -> np.ndarray:
-    """Return which cells are more certainly above their sides than those within `CREST_CELLS` across, bool."""
-    crests = np.ones(certain.shape, dtype=bool)
-    for number in range(DIRECTIONS):
-        down, right = _step(number)
-        chosen = direction == number
-        for cells in range(1, CREST_CELLS + 1):
-            for side in (cells, -cells):
-                crests &= ~chosen | (certain >= _moved(certain, side * right, -side * down))
-    return crests

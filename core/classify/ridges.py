@@ -71,8 +71,9 @@ LIT_SHARE = 0.75
 """Least share of the points of the other side from which a bin shows the ground. Where fewer are, a part of them is of
 beams that also meet the head, and their mean is up to 20 mm too high."""
 
-CREST_M = 0.02
-"""Distance from the axis up to which the top of a ridge is its crest: half a head, less the error of the axis."""
+CREST_M = 0.04
+"""Distance from the axis up to which the crest of a ridge is looked for: the axis of a head of which one side is hidden
+is as far off."""
 
 SIDES_M = np.linspace(-1.0, 1.0, 11)
 """Places along the line at which the sides of a ridge are looked at: check rails are 3 m long and more."""
@@ -156,14 +157,24 @@ def above_sides(xy: np.ndarray, height: np.ndarray, lines: Lines, piece: np.ndar
     Points are given by place and height above the bed. The edge of a slab or a shoulder is a crest as well, but the
     ground on one side leads up to it. A side that is not seen does not count; without a crest, the height is NaN.
     """
-    sections, middle = _sections(xy, height, lines, piece, LIT_SHARE), BINS // 2
-    out_m = MIDDLES_M[middle:]
-    beside = (out_m > GROUND_M[0]) & (out_m < GROUND_M[1])
-    sides = sections[:, middle:], sections[:, middle - 1 :: -1]
-    crest_m = _known_mean(sections[:, np.abs(MIDDLES_M) < CREST_M])
-    grounds = [_at_zero(side[:, beside], out_m[beside]) for side in sides]
-    rises = [np.where(seen < GROUND_SEEN, np.inf, crest_m - at_axis_m) for at_axis_m, seen in grounds]
-    return np.min(rises, axis=0)
+    count, rise = _profiles(xy, height, lines, to_one_side(lines, piece), piece)
+    lit, middle = _shown(count, rise, LIT_SHARE), BINS // 2
+    tops = np.flatnonzero(np.abs(MIDDLES_M) < CREST_M)
+    with np.errstate(invalid="ignore"):
+        crest_m = _of_three(rise, tops) / _of_three(count, tops)
+    rises = []
+    for way, side in ((1, lit[:, middle:]), (-1, lit[:, middle - 1 :: -1])):
+        out_m = MIDDLES_M[middle:]
+        beside = (out_m > GROUND_M[0]) & (out_m < GROUND_M[1])
+        at_axis_m, slope, seen = _straight(side[:, beside], out_m[beside])
+        ground_m = at_axis_m[:, None] + slope[:, None] * way * MIDDLES_M[tops]
+        rises.append(np.where(seen[:, None] < GROUND_SEEN, np.inf, crest_m - ground_m))
+    return np.fmax.reduce(np.min(rises, axis=0), axis=1)
+
+
+def _of_three(values: np.ndarray, bins: np.ndarray) -> np.ndarray:
+    """Sum the values of bins, (k,) numbers, with those before and after each, (pieces, k)."""
+    return values[:, bins - 1] + values[:, bins] + values[:, bins + 1]
 
 
 def sides_of(level: np.ndarray, grid: Grid, lines: Lines) -> tuple[np.ndarray, np.ndarray]:
@@ -237,16 +248,16 @@ def _known_mean(values: np.ndarray) -> np.ndarray:
         return np.where(known, values, 0.0).sum(axis=1) / known.sum(axis=1)
 
 
-def _at_zero(values: np.ndarray, places_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _straight(values: np.ndarray, places_m: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Fit straight lines to rows of values, (k, n), at places, (n,), without values that are NaN.
 
-    Returns where each line is at place 0, NaN without values, and the share of the values that are known, (k,) each.
+    Returns where each line is at place 0, NaN without values, its slope, and the share of known values, (k,) each.
     """
     known = np.isfinite(values)
     mean, place_m = _known_mean(values), _known_mean(np.where(known, places_m, np.nan))
     step_m = np.where(known, places_m - place_m[:, None], 0.0)
     slope = (np.where(known, values, 0.0) * step_m).sum(axis=1) / np.maximum((step_m**2).sum(axis=1), BIN_M**2)
-    return mean - slope * place_m, known.mean(axis=1)
+    return mean - slope * place_m, slope, known.mean(axis=1)
 
 
 def _sections(
@@ -257,7 +268,11 @@ def _sections(
     What is in the shadow of a head shows few points, of the beams that also meet its edge: their height is between. A
     bin is seen if it has this share of the points that are as far away on the other side.
     """
-    count, rise = _profiles(xy, height, lines, to_one_side(lines, piece), piece)
+    return _shown(*_profiles(xy, height, lines, to_one_side(lines, piece), piece), seen)
+
+
+def _shown(count: np.ndarray, rise: np.ndarray, seen: float) -> np.ndarray:
+    """Mean heights of cross-sections as of `_profiles`, (k, BINS); NaN in bins that are unseen, see `_sections`."""
     with np.errstate(invalid="ignore"):
         return np.where(count < seen * count[:, ::-1], np.nan, rise / count)
 

@@ -64,6 +64,17 @@ def test_a_head_is_seen_beside_its_own_shadow():
     assert low.crest.sum() > 0.4 * SIDE
 
 
+def test_a_head_of_little_more_than_the_scatter_is_seen_along_several_metres():
+    """Of 1.3 m of it, hardly a line is certain (worlds 13634 and 13736)."""
+    rng = np.random.RandomState(8)
+    level = SCATTER_M * rng.standard_normal((SIDE, SIDE))
+    level = np.where(np.abs(off_m(20.0)) < 0.036, level + 0.016, level)
+    crest = found(np.where(rng.uniform(size=level.shape) < 0.3, level, np.nan)).crest
+    inner = (np.hypot(ROW - SIDE / 2, COLUMN - SIDE / 2) < 0.4 * SIDE) & crest
+    assert (np.abs(off_m(20.0))[inner] < 0.08).mean() > 0.9
+    assert inner.sum() > 15
+
+
 def test_what_is_not_seen_has_no_crest():
     low = found(np.full((SIDE, SIDE), np.nan))
     assert not low.crest.any()

@@ -135,10 +135,11 @@ def test_a_head_is_no_wider_for_what_is_seen_in_its_shadow(mixed, known):
     [
         (lambda left_m: np.where(np.abs(left_m) < 0.036, 0.05, 0.0), 0.05),
         (lambda left_m: np.where(np.abs(left_m) < 0.036, 0.05, 0.0) + 0.1 * left_m, 0.05),
+        (lambda left_m: np.where(np.abs(left_m - 0.03) < 0.036, 0.05, 0.0) + 0.1 * left_m, 0.05),
         (lambda left_m: np.where(left_m > 0, -0.3 * left_m, 0.0), -0.0015),
         (lambda left_m: -0.2 * np.abs(left_m), -0.002),
     ],
-    ids=["head", "head on a slope", "edge of a slab", "crest of a bank"],
+    ids=["head", "head on a slope", "head aside", "edge of a slab", "crest of a bank"],
 )
 def test_the_ground_leads_up_to_an_edge_and_passes_below_a_head(height_at, above_m):
     assert above_sides(*section(height_at))[0] == pytest.approx(above_m, abs=0.002)
