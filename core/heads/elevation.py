@@ -123,9 +123,12 @@ def _begun_on(others: Sequence[RailLine], rail: RailLine, reach_m: float, shared
         return rail
     other, along = others[feet.line[0]], rail.line.t
     above_m = np.interp(feet.t, other.line.t, other.xyz[:, 2]) - rail.xyz[0, 2]
+    gap_m = rail.gaps[0, 1] if len(rail.gaps) and rail.gaps[0, 0] == 0 else 0.0
     if shared_m:  # a ridge of both is about as high up to where they part
         share = 1 - np.minimum(along / shared_m, 1.0) ** 2
-    else:  # what is extrapolated errs to the same side all along
+    elif gap_m and not any(start <= feet.t[0] <= end for start, end in other.gaps):  # the further, the worse
+        share = (1 - np.minimum(along / gap_m, 1.0)) ** 2
+    else:  # what few points show errs to the same side all along
         error_m, of_other_m = _height_errors(rail, along), _height_errors(other, feet.t)
         share = error_m * error_m[0] / (error_m[0] ** 2 + of_other_m**2 + USUAL_ERROR_M**2)
     return replace(rail, xyz=rail.xyz + (share * above_m)[:, None] * [0.0, 0.0, 1.0])
