@@ -411,7 +411,7 @@ class SearchFigures:
         Length of the rails with a partner that are as narrow as a head, and of those that are wider and round, before
         the cloud is known to be blunt; see `classify.ways`.
     clear_m : float
-        Length of those that are not round and stand clear of their bed: no tops of them are too low to be seen.
+        Length of those as narrow as a head that stand clear of their bed: no tops of them are too low to be seen.
     unsure_m : float
         Length of those that are wider, but not round and not too wide for a head, and of rails in pavements.
     """

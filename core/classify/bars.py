@@ -89,7 +89,7 @@ def on_bars(
     width_m, share_m = beside.widths(kept.lines, piece), own_lengths(kept, settings)
     narrow = (width_m < settings.head_width_m + tolerances.wider_m)[piece]
     kinds = _by_shape(kept, piece, width_m, narrow, shown, settings)
-    clear = (kinds[0] | kinds[2]) & (mean_of(kept.lines.height, piece) >= CLEAR_M)[piece]
+    clear = kinds[0] & (mean_of(kept.lines.height, piece) >= CLEAR_M)[piece]
     sharp_m, round_m, unsure_m, clear_m = (float(share_m[kind].sum()) for kind in (*kinds, clear))
     kept = _with_kept_partners(kept.of(narrow), settings, tolerances)
     beside = Near.find(shown.xy[chosen], kept.lines)

@@ -56,18 +56,17 @@ def have_partners(lines: Lines, spacings_m: Sequence[float], height_m: float, wo
 
     `height_m` is the largest difference in height above the bed of either; see `partners` for `worse_m`.
     """
-    stations = [partners(lines, spacing_m, SPACING_M, height_m, worse_m)[0] for spacing_m in spacings_m]
-    return np.max(stations, axis=0) >= MIN_STATIONS
+    return partner_sides(lines, spacings_m, height_m, worse_m) != 0
 
 
-def partner_sides(lines: Lines, spacings_m: Sequence[float], height_m: float) -> np.ndarray:
+def partner_sides(lines: Lines, spacings_m: Sequence[float], height_m: float, worse_m: float = np.inf) -> np.ndarray:
     """Return where each cell's partner is at the best of the distances of the two heads, (n,): see `have_partners`.
 
     1 if it is to the left, -1 to the right, and 0 without one.
     """
     most, sides = np.full(len(lines.axis), MIN_STATIONS - 1), np.zeros(len(lines.axis), dtype=np.int64)
     for spacing_m in spacings_m:
-        stations, side, _ = partners(lines, spacing_m, SPACING_M, height_m)
+        stations, side, _ = partners(lines, spacing_m, SPACING_M, height_m, worse_m)
         sides, most = np.where(stations > most, side, sides), np.maximum(stations, most)
     return sides
 

@@ -103,7 +103,7 @@ class Ridges:
     @classmethod
     def measure(cls, xy: np.ndarray, height: np.ndarray, lines: Lines, piece: np.ndarray) -> Ridges:
         """Measure ridges, given points by place and height above the bed, and the piece of each line's cell."""
-        sections = _sections(xy, height, lines, piece)
+        sections = _shown(*_profiles(xy, height, lines, to_one_side(lines, piece), piece), SHOWN_SHARE)
         middle = BINS // 2
         sides = sections[:, middle:], sections[:, middle - 1 :: -1]
         with np.errstate(invalid="ignore"):
@@ -260,21 +260,14 @@ def _straight(values: np.ndarray, places_m: np.ndarray) -> tuple[np.ndarray, np.
     return mean - slope * place_m, slope, known.mean(axis=1)
 
 
-def _sections(
-    xy: np.ndarray, height: np.ndarray, lines: Lines, piece: np.ndarray, seen: float = SHOWN_SHARE
-) -> np.ndarray:
-    """Mean heights of the points beside each piece relative to its line, (pieces, BINS); NaN in bins that are unseen.
+def _shown(count: np.ndarray, rise: np.ndarray, share: float) -> np.ndarray:
+    """Mean heights of cross-sections relative to their line, see `_profiles`, (k, BINS); NaN in bins that are unseen.
 
     What is in the shadow of a head shows few points, of the beams that also meet its edge: their height is between. A
     bin is seen if it has this share of the points that are as far away on the other side.
     """
-    return _shown(*_profiles(xy, height, lines, to_one_side(lines, piece), piece), seen)
-
-
-def _shown(count: np.ndarray, rise: np.ndarray, seen: float) -> np.ndarray:
-    """Mean heights of cross-sections as of `_profiles`, (k, BINS); NaN in bins that are unseen, see `_sections`."""
     with np.errstate(invalid="ignore"):
-        return np.where(count < seen * count[:, ::-1], np.nan, rise / count)
+        return np.where(count < share * count[:, ::-1], np.nan, rise / count)
 
 
 def _profiles(

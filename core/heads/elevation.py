@@ -36,9 +36,6 @@ CHANCE_GAPS = 0.002
 MAX_UNSUPPORTED_END_M = 0.15
 """Length without points from which a free end is cut off: the raster's lines curl where a rail ends."""
 
-USUAL_ERROR_M = 0.002
-"""Error of the heights of two rails where both are seen: what differs by less needs no mending."""
-
 NO_FREE_ENDS = np.zeros(2, dtype=bool)
 """Marks both ends of a line to be kept, with or without points."""
 
@@ -101,11 +98,11 @@ def elevate(
 def begun_on_others(
     rails: Sequence[RailLine], reach_m: float, shared_m: Sequence[tuple[float, float]] = ()
 ) -> list[RailLine]:
-    """Give ends whose heights are uncertain the height of the rail on whose head they begin, within `reach_m` of it.
+    """Give ends that no points show the height of the rail on whose head they begin, within `reach_m` of it.
 
-    A branch begins on its stock rail, on the same sleepers. Where points show neither blade nor frog, its heights are
-    extrapolated for up to 10 m. `shared_m` are the lengths of both ends of each rail that points show as one with
-    others; see `shared_ends`.
+    A branch begins on its stock rail, on the same sleepers. Where points show neither blade nor frog, its heights would
+    be extrapolated for up to 10 m; the grade where its points begin stays as it is. `shared_m` are the lengths of both
+    ends of each rail that points show as one with others; see `shared_ends`.
     """
     level = []
     for number, rail in enumerate(rails):
@@ -117,33 +114,19 @@ def begun_on_others(
 
 
 def _begun_on(others: Sequence[RailLine], rail: RailLine, reach_m: float, shared_m: float) -> RailLine:
-    """Move the start of a rail to the height of another rail there, if it is shared, or as their errors ask for."""
-    feet = project([other.xyz[:, :2] for other in others], rail.xyz[:1, :2], reach_m)
+    """Give the start of a rail, if it is in a gap or shared, the height of another rail there that has points."""
+    gap_m = max(rail.gaps[0, 1] if len(rail.gaps) and rail.gaps[0, 0] == 0 else 0.0, shared_m)
+    feet = project([other.xyz[:, :2] for other in others if gap_m], rail.xyz[:1, :2], reach_m)
     if not len(feet.t):
         return rail
-    other, along = others[feet.line[0]], rail.line.t
-    above_m = np.interp(feet.t, other.line.t, other.xyz[:, 2]) - rail.xyz[0, 2]
-    gap_m = rail.gaps[0, 1] if len(rail.gaps) and rail.gaps[0, 0] == 0 else 0.0
-    if shared_m:  # a ridge of both is about as high up to where they part
-        share = 1 - np.minimum(along / shared_m, 1.0) ** 2
-    elif gap_m and not any(start <= feet.t[0] <= end for start, end in other.gaps):  # the further, the worse
-        share = (1 - np.minimum(along / gap_m, 1.0)) ** 2
-    else:  # what few points show errs to the same side all along
-        error_m, of_other_m = _height_errors(rail, along), _height_errors(other, feet.t)
-        share = error_m * error_m[0] / (error_m[0] ** 2 + of_other_m**2 + USUAL_ERROR_M**2)
-    return replace(rail, xyz=rail.xyz + (share * above_m)[:, None] * [0.0, 0.0, 1.0])
-
-
-def _height_errors(rail: RailLine, along: np.ndarray) -> np.ndarray:
-    """Return by how much the height of a rail errs at chainages, (n,) metres, beyond its usual error.
-
-    Infinite if this is unknown.
-    """
-    known = rail.support
-    if known is None:
-        return np.full(len(along), np.inf)
-    beyond = np.maximum(known.sigmaz_m**2 - np.median(known.sigmaz_m) ** 2, 0.0)
-    return np.sqrt(np.interp(along, known.t, beyond))
+    other, (t,), along = others[feet.line[0]], feet.t, rail.line.t
+    if not shared_m and any(start <= t <= end for start, end in other.gaps):
+        return rail
+    above_m = np.interp(t, other.line.t, other.xyz[:, 2]) - rail.xyz[0, 2]
+    way = np.minimum(along / gap_m, 1.0)
+    # A ridge of both is about as high up to where they part; a gap is extrapolated, the further the worse.
+    raised_m = above_m * (1 - way**2 if shared_m else (1 - way) ** 2)
+    return replace(rail, xyz=rail.xyz + raised_m[:, None] * [0.0, 0.0, 1.0])
 
 
 def shared_ends(points: HeadPoints) -> tuple[float, float]:

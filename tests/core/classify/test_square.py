@@ -112,6 +112,17 @@ def test_guard_and_third_rails_and_what_is_at_gauge_from_a_track_go_and_rails_st
     assert (found & on)[inner(xyz, 8)].sum() / on[inner(xyz, 8)].sum() > 0.98
 
 
+def test_a_higher_rail_of_the_next_track_is_not_a_third_rail():
+    """It is 1.8 m from the rail of a track that has its partner on the other side, and hides its own (world 13988)."""
+    rng = np.random.RandomState(5)
+    xyz, _ = ballasted(rng)
+    left = SPACING / 2 + 1.8
+    xyz, bar = with_bar(xyz, WIDTH, 0.3, left, TOP_M + 0.06)
+    shown = turned(xyz, 0.3)[1] < left + WIDTH
+    found = classify_square(xyz[shown], SETTINGS).rail
+    assert found[(bar & inner(xyz, 8))[shown]].mean() > 0.9
+
+
 def test_a_rail_behind_a_wheel_at_the_end_of_the_cloud_is_labelled():
     rng = np.random.RandomState(12)
     xyz, on = ballasted(rng, 0.0)
