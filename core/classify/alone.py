@@ -61,18 +61,20 @@ LEAST_SEEN, LEAST_PLACES = 0.1, 4
 """Share of the cells of a bar beside which the ground is seen at a distance, and distances that show a slope."""
 
 
-def may_hide_partner(lines: Lines, piece: np.ndarray, tops: Tops, settings: Settings, height_m: float) -> np.ndarray:
+def may_hide_partner(
+    lines: Lines, piece: np.ndarray, cells: np.ndarray, tops: Tops, settings: Settings, height_m: float
+) -> np.ndarray:
     """Return which pieces have a place, at one of the distances of two heads, that may hold one, (pieces,) bool.
 
-    Cells are on `piece`, (n,). A head differs by at most `height_m` from theirs; ground that is lower shows that there
-    is none, where it is seen as often as on the way there.
+    Lines are those of `cells`, (n,), on `piece`, (n,). A head differs by at most `height_m` from theirs; ground that is
+    lower shows that there is none, where it is seen as often as on the way there.
     """
     low_m = lines.height - height_m
     hidden = (mean_of(low_m, piece) < LOWEST_M) | (mean_of(lines.height, piece) > UNDER_FOOT_M)
     for left_m in [side * spacing_m for spacing_m in settings.spacings_m for side in (1, -1)]:
-        on_the_way = _lower(lines, piece, left_m * WAY, low_m, tops)
+        on_the_way = _lower(lines, piece, cells, left_m * WAY, low_m, tops)
         for place_m in left_m + SPACING_M * PLACES:
-            on_head = _lower(lines, piece, place_m + settings.head_width_m * ON_HEAD, low_m, tops)
+            on_head = _lower(lines, piece, cells, place_m + settings.head_width_m * ON_HEAD, low_m, tops)
             hidden |= on_head <= SHOWN * on_the_way
     return hidden
 
@@ -107,16 +109,18 @@ def _slope(weight: np.ndarray, fall_m: np.ndarray) -> np.ndarray:
     return (weight * centred * fall_m).sum(axis=0) / (weight * centred**2).sum(axis=0)
 
 
-def _lower(lines: Lines, piece: np.ndarray, places_m: np.ndarray, low_m: np.ndarray, tops: Tops) -> np.ndarray:
+def _lower(
+    lines: Lines, piece: np.ndarray, cells: np.ndarray, places_m: np.ndarray, low_m: np.ndarray, tops: Tops
+) -> np.ndarray:
     """Return the share of cells that show ground lower than `low_m`, (n,), and nothing else, for each piece, (pieces,).
 
-    They are at several places to one side of the lines.
+    They are at several places to one side of the lines. The vault over hidden ground is not lower ground.
     """
-    across, lower = to_one_side(lines, piece), np.zeros(len(piece))
+    across, lower, z = to_one_side(lines, piece), np.zeros(len(piece)), tops.z.ravel()
     for place_m in places_m:
         cell, inside = tops.grid.cells(lines.axis + place_m * across)
         seen = inside & tops.seen.ravel()[cell] & ~tops.high.ravel()[cell]
-        lower += seen & (tops.top.ravel()[cell] < low_m * MILLIMETRES)
+        lower += seen & (tops.top.ravel()[cell] < low_m * MILLIMETRES) & (np.abs(z[cells] - z[cell]) < HIGH_M)
     return mean_of(lower, piece) / len(places_m)
 
 

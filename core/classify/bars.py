@@ -173,7 +173,7 @@ def _are_rails(
     alone &= mean_of(free, piece) > MAJORITY
     mine = alone[piece] & ~partnered
     lines, (numbers, number) = kept.lines.of(mine), np.unique(piece[mine], return_inverse=True)
-    alone[numbers] = may_hide_partner(lines, number, shown.tops, settings, tolerances.partner_m)
+    alone[numbers] = may_hide_partner(lines, number, kept.cell[mine], shown.tops, settings, tolerances.partner_m)
     if not thin:  # wide beams blend a face with what is below it
         alone[numbers] &= ~are_solid(lines, number, shown.xy, shown.height, settings.head_width_m)
     return partnered | (alone[piece] & ~others)

@@ -138,10 +138,21 @@ def mean_of(values: np.ndarray, piece: np.ndarray) -> np.ndarray:
 
 
 def to_one_side(lines: Lines, piece: np.ndarray) -> np.ndarray:
-    """Return unit vectors across the lines, (n, 2), to the same side on all of a piece: lines have no direction."""
-    across = lines.across
-    first = across[np.unique(piece, return_index=True)[1]]
-    return np.where(np.einsum("ij,ij->i", across, first[piece])[:, None] < 0, -across, across)
+    """Return unit vectors across the lines, (n, 2), to the same side on all of a piece: lines have no direction.
+
+    The side goes from cell to cell: a sharp arc turns by more than a right angle.
+    """
+    across, count = lines.across, len(piece)
+    first = np.unique(piece, return_index=True)[1][piece]
+    one, other = links(lines).T
+    turned = np.einsum("ij,ij->i", across[one], across[other]) < 0
+    # Each cell is there twice, by the side that its vector points to: cells that point to one side are connected.
+    rights = np.where(turned, other + count, other), np.where(turned, other, other + count)
+    pairs = np.column_stack([np.append(one, one + count), np.append(*rights)])
+    side = pieces_of(2 * count, pairs)
+    same, opposite = side[:count] == side[first], side[count:] == side[first]
+    near = np.einsum("ij,ij->i", across, across[first]) >= 0  # parts that nothing connects
+    return np.where(np.where(same == opposite, near, same)[:, None], across, -across)
 
 
 def long_enough(
