@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from rail_extract.core.classify.lines import Lines, joined
-from rail_extract.core.classify.pieces import cross_over, links, long_enough, lower_than_beside
+from rail_extract.core.classify.pieces import cross_over, links, long_enough, lower_than_beside, to_one_side
 
 
 def line(*parts):
@@ -58,3 +58,14 @@ def test_what_is_lower_beside_a_rail_is_no_head(apart_m, lower):
     found = lower_than_beside(both, 0.045)
     assert not found[: len(rail.axis)].any()
     assert found[len(rail.axis) :].all() == lower
+
+
+@pytest.mark.parametrize("turned", [0.4, 2.8])
+def test_vectors_across_an_arc_point_to_one_side_of_it(turned):
+    """In world 14170, grooves of an arc of 27 m had their heads on the wrong side after it had turned by 90 degrees."""
+    angle = np.random.RandomState(5).permutation(np.arange(0.0, turned, 0.08 / 25.0))
+    away, ones = np.column_stack([np.cos(angle), np.sin(angle)]), np.ones(len(angle))
+    lines = Lines(25.0 * away, 0.15 * ones, (angle + np.pi / 2) % np.pi, ones, ones, 1.0)
+    outwards = np.einsum("ij,ij->i", to_one_side(lines, np.zeros(len(angle), dtype=int)), away)
+    assert np.abs(outwards).min() > 0.99
+    assert (outwards > 0).all() or (outwards < 0).all()

@@ -262,6 +262,17 @@ def test_a_lone_bar_is_a_rail_where_something_may_hide_the_other_one(wide_m, kep
     assert classify_square(rough(xyz, rng)[~hidden], SETTINGS).rail.any() == kept
 
 
+def test_the_vault_of_a_tunnel_over_hidden_ground_is_not_lower_ground():
+    """In world 14138, the wall of a train hid the other rail, and only the vault was seen over its place."""
+    rng = np.random.RandomState(21)
+    xyz, bar = with_bar(flat(16.0, rng=rng, per_m2=1200), WIDTH, 0.3, -1.0)
+    hidden = turned(xyz, 0.3)[1] > -1.0 + SPACING - 0.5
+    vault = flat(16.0, rng=rng, per_m2=400)
+    vault[:, 2] = 6.0 + rng.normal(0, 0.004, len(vault))
+    found = classify_square(np.concatenate([rough(xyz, rng)[~hidden], vault]), SETTINGS).rail
+    assert found[: np.count_nonzero(~hidden)][bar[~hidden] & inner(xyz[~hidden], 16)].mean() > 0.9
+
+
 def test_of_two_lone_bars_within_a_gauge_the_shorter_one_is_a_guard_rail():
     """A guard rail hides the rail that it guards from a scanner beside the track, so that neither bar has a partner."""
     rng = np.random.RandomState(21)

@@ -15,7 +15,7 @@ from rail_extract.laboratory.scenes.raw_photogrammetry import (
     misplaced,
 )
 from rail_extract.laboratory.scenes.raw_scanner import RawScanner
-from rail_extract.laboratory.scenes.raw_world import HEAD, ground, pavement, running_rails
+from rail_extract.laboratory.scenes.raw_world import HEAD, PLANT, ground, pavement, running_rails
 from rail_extract.laboratory.scenes.write import write_raw
 
 STANDARD = STANDARDS["EN_60E1_1435"]
@@ -72,6 +72,17 @@ def test_a_level_crossing_does_not_raise_the_rails_that_images_show():
     lowered_m = scene.rails[0][:, 2] - scene.shown[0][:, 2]
     assert lowered_m.min() > 0.02
     assert np.ptp(lowered_m) < 0.006
+
+
+def test_a_plant_beside_a_rail_does_not_raise_it():
+    """In world 14165, weeds raised the truth by 15 mm over 2 m."""
+
+    def plant(world):
+        world.box(STANDARD.gauge_m / 2 + 0.08, 0.2, 0.1, 0.2, PLANT, world.between(9.0, 11.0))
+
+    scene = surveyed(Photogrammetry(blur_varies=0.0, wave_m=0.0, drift_m=0.0), (ground, running_rails, plant))
+    for rail, shown in zip(scene.rails, scene.shown):
+        assert np.ptp(rail[:, 2] - shown[:, 2]) < 0.006
 
 
 def test_two_epochs_share_the_place_and_have_errors_of_their_own():
