@@ -71,6 +71,10 @@ LIT_SHARE = 0.75
 """Least share of the points of the other side from which a bin shows the ground. Where fewer are, a part of them is of
 beams that also meet the head, and their mean is up to 20 mm too high."""
 
+IN_SHADOW_M = 0.005
+"""Least depth of these points below a crest, on average: what is as high as it is not in its shadow, however few points
+there are. Measured: 9 mm and more beside heads, and none beside the edge of a trough."""
+
 CREST_M = 0.04
 """Distance from the axis up to which the crest of a ridge is looked for: the axis of a head of which one side is hidden
 is as far off."""
@@ -158,15 +162,17 @@ def above_sides(xy: np.ndarray, height: np.ndarray, lines: Lines, piece: np.ndar
     ground on one side leads up to it. A side that is not seen does not count; without a crest, the height is NaN.
     """
     count, rise = _profiles(xy, height, lines, to_one_side(lines, piece), piece)
-    lit, middle = _shown(count, rise, LIT_SHARE), BINS // 2
+    lit, every = (_shown(count, rise, share) for share in (LIT_SHARE, 0.0))
     tops = np.flatnonzero(np.abs(MIDDLES_M) < CREST_M)
     with np.errstate(invalid="ignore"):
         crest_m = _of_three(rise, tops) / _of_three(count, tops)
-    rises = []
-    for way, side in ((1, lit[:, middle:]), (-1, lit[:, middle - 1 :: -1])):
-        out_m = MIDDLES_M[middle:]
+    lit_from_m, rises = np.fmax.reduce(crest_m, axis=1) - IN_SHADOW_M, []
+    for way in (1, -1):
+        out_m = way * MIDDLES_M
         beside = (out_m > GROUND_M[0]) & (out_m < GROUND_M[1])
-        at_axis_m, slope, seen = _straight(side[:, beside], out_m[beside])
+        is_lit = _known_mean(every[:, beside]) > lit_from_m
+        side = np.where(is_lit[:, None], every[:, beside], lit[:, beside])
+        at_axis_m, slope, seen = _straight(side, out_m[beside])
         ground_m = at_axis_m[:, None] + slope[:, None] * way * MIDDLES_M[tops]
         rises.append(np.where(seen[:, None] < GROUND_SEEN, np.inf, crest_m - ground_m))
     return np.fmax.reduce(np.min(rises, axis=0), axis=1)
