@@ -55,8 +55,8 @@ class Tolerances:
         Tops that may be those of rails.
     wider_m, wider_single_m : float
         Width beyond that of a head up to which the top of a piece may be one, with a partner and without. Measured
-        with a partner: up to 17 mm, 26 mm in two passes of a scanner 3 cm apart, and 41 mm on thin clouds;
-        kerbs of 150 mm 62 mm, on thin clouds 59 mm.
+        with a partner: up to 17 mm, 26 mm in two passes of a scanner 3 cm apart, 34 mm from four tripods, and 41 mm on
+        thin clouds; kerbs of 150 mm 62 mm, on thin clouds 59 mm.
     """
 
     along_m: float
