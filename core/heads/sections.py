@@ -206,6 +206,7 @@ def outline_middles(points: HeadPoints, seen: np.ndarray) -> Middles:
         here = slice(*np.searchsorted(station, [first, last]))
         counts = np.bincount(bins[here], minlength=grid.size).astype(float)
         if counts.sum() < MIN_SECTION_POINTS:
+            middles.aside[first:last] = np.diff(np.searchsorted(points.station, [first, last])) >= MIN_SECTION_POINTS
             continue
         section, fitted, width_m = _fitted(counts, head, grid, start)
         if section.shares[FACES.stop : -1].sum() > MAX_BEHIND_SHARE:
