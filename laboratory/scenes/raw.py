@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import median_filter
 from scipy.spatial import cKDTree
 
 from ...core.frame import LocalFrame
@@ -14,7 +15,7 @@ from ...core.standards import RailStandard
 from ..curves import Curve
 from .raw_photogrammetry import CELL_M, GROUND_CLASS, Photogrammetry, Surface, misplaced, survey
 from .raw_scanner import RawScanner, cast
-from .raw_world import HEAD, PLANT, SLEEPER_STEP_M, Bedding, World, along_and_left, ways_of
+from .raw_world import HEAD, SLEEPER_STEP_M, Bedding, World, along_and_left, ways_of
 from .tracks import Track
 
 BALLAST = Bedding()
@@ -27,7 +28,10 @@ BESIDE_M, PAVED_M = 0.3, 0.02
 a pavement."""
 
 BEYOND_M = 2 * SLEEPER_STEP_M
-"""Distance from a pavement or a plant within which the mean over two sleepers and the blur contain it."""
+"""Distance from a pavement within which the mean over two sleepers and the blur contain it."""
+
+STEADY_M = 8.0
+"""Length of rail over which the median of what a surface shows is that of the rail: weeds and crossings take 2 m."""
 
 Thing = Callable[[World], None]
 
@@ -167,8 +171,9 @@ def crests_of(rails: tuple[np.ndarray, ...], line: Curve, surface: Surface, blur
     """Lay rails, (k, 3) each, as far below their tops as the blur of a surface lowers them.
 
     Where another rail is within `BLENDED` of the blur, in a switch, the surface is one ridge of both, higher than
-    either would be alone; in a level crossing nothing lowers it, and plants beside it raise it. As no rail rises by
-    centimetres there, what it shows on both sides of such a place is interpolated.
+    either would be alone; and in a level crossing nothing lowers it. As no rail rises by centimetres there, what it
+    shows on both sides of such a place is interpolated. Nor does one where plants raise the surface, or fall where the
+    throat of a crossing or the end of the cloud lowers it: over `STEADY_M`, the median counts.
     """
     reach_m = BLENDED * blur_m
     lowered = []
@@ -176,12 +181,13 @@ def crests_of(rails: tuple[np.ndarray, ...], line: Curve, surface: Surface, blur
         others = [Polyline(other[:, :2]).resampled(CELL_M).xy for other in rails[:number] + rails[number + 1 :]]
         alone = cKDTree(np.concatenate(others)).query(rail[:, :2])[0] > reach_m
         along = length_along(rail[:, :2])
-        changed = along[_is_paved(rail, line, surface) | _is_planted(rail, line, surface, reach_m), None]
-        ridge = alone & (cKDTree(changed).query(along[:, None])[0] > BEYOND_M)
+        paved = along[_is_paved(rail, line, surface), None]
+        ridge = alone & (cKDTree(paved).query(along[:, None])[0] > BEYOND_M)
         ridge = ridge if ridge.any() else alone
         shown = crest(rail, line, surface)
         if ridge.any():
-            shown[:, 2] = rail[:, 2] + np.interp(along, along[ridge], (shown - rail)[ridge, 2])
+            size = 2 * int(0.5 * STEADY_M / np.median(np.diff(along))) + 1
+            shown[:, 2] = rail[:, 2] + np.interp(along, along[ridge], median_filter((shown - rail)[ridge, 2], size))
         lowered.append(shown)
     return tuple(lowered)
 
@@ -191,13 +197,6 @@ def _is_paved(rail: np.ndarray, line: Curve, surface: Surface) -> np.ndarray:
     _, chainage, left = along_and_left(line, rail[:, :2])
     beside = np.max([surface.at(chainage, left + side) for side in (-BESIDE_M, BESIDE_M)], axis=0)
     return rail[:, 2] - beside < PAVED_M
-
-
-def _is_planted(rail: np.ndarray, line: Curve, surface: Surface, reach_m: float) -> np.ndarray:
-    """Return where a plant is within `reach_m` beside the axis of a rail, (k, 3), (k,) bool."""
-    _, chainage, left = along_and_left(line, rail[:, :2])
-    sides = np.arange(-reach_m, reach_m, CELL_M)
-    return np.any([surface.nearest(surface.kind == PLANT, chainage, left + side) for side in sides], axis=0)
 
 
 def crest(rail: np.ndarray, line: Curve, surface: Surface) -> np.ndarray:
