@@ -189,8 +189,9 @@ def _touch(from_end: np.ndarray, line: np.ndarray) -> tuple[int, Bridge] | None:
         return None
     arc = PartingLaw.fitted(-own_x, np.abs(apart_m), ARC)
     touch_m = -arc.way_at(MISFIT_M)
-    if not 0 < touch_m < min(MAX_BACK_M, x[-1]):
+    if not 0 < touch_m < MAX_BACK_M:
         return None
+    touch_m = min(touch_m, x[-1] - DIRECTION_M)  # the toe of the switch may be beyond the end of the cloud
     onward = way[int(np.abs(x - touch_m).argmin())]
     stock = line[onward:] if way[0] < way[-1] else line[onward::-1]
     curve = bridge(from_end, stock, misfit_m=KNOWN_MISFIT_M) if Polyline(stock).length_m >= DIRECTION_M else None
