@@ -91,6 +91,21 @@ def test_a_branch_that_ends_freely_is_extended_tangentially_to_its_stock_rail(ra
     assert cKDTree(np.concatenate([stock, arc])).query(network.lines[1])[0].max() < 0.06
 
 
+def test_a_branch_whose_switch_begins_beyond_the_end_of_the_cloud_is_led_to_its_rail():
+    """In world 14417, the law of an arc put the toe of a flat switch 11 m beyond the end of the cloud."""
+    radius, begin, drawn = 1100.0, -10.0, 15.0
+    stock, branch = along_x(0, 60), along_x(drawn, 60)
+    branch[:, 1] = (branch[:, 0] - begin) ** 2 / (2 * radius)
+    nodes = np.concatenate([stock[[0, -1]], branch[[0, -1]]])
+    network = LineNetwork((stock, branch), nodes, np.array([[0, 1], [2, 3]]))
+    network = attach_branches(network, cKDTree(np.concatenate([stock, branch])), 20.0)
+    assert len(network.passes) == 1
+    led = min(network.lines, key=lambda line: np.hypot(*(line[[0, -1]] - branch[-1]).T).min())
+    assert led[:, 0].min() > 0.5
+    beyond = led[led[:, 0] > 12.0]
+    np.testing.assert_allclose(beyond[:, 1], (beyond[:, 0] - begin) ** 2 / (2 * radius), atol=0.03)
+
+
 @pytest.mark.parametrize(
     ("radius", "apart_m", "joined"),
     [(np.inf, 0.35, False), (np.inf, 0.5, False)]
