@@ -17,7 +17,7 @@ from .railway import Railway, draw_railway
 from .surroundings import TUNNEL, Surroundings, draw_surroundings
 from .surveys import Survey, draw_kind, draw_survey, marked
 
-VERSION = 16
+VERSION = 17
 """Changes when a seed gives another world: results of different versions are never mixed."""
 
 RAW, CLASSIFIED = "raw", "classified"
