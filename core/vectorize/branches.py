@@ -155,20 +155,24 @@ def attach_branches(network: LineNetwork, seen: cKDTree, max_gap_m: float, progr
             continue
         near = np.flatnonzero(((from_end[0] > low) & (from_end[0] < high)).all(axis=1))
         touches = [
-            (touch[1].cost, number, *touch)
+            (beyond, touch[1].cost, number, *touch)
+            for beyond in (False, True)
             for number in near.tolist()
-            if number != end // 2 and (touch := _touch(from_end, network.lines[number])) is not None
+            if number != end // 2 and (touch := _touch(from_end, network.lines[number], beyond)) is not None
             if unseen_m(touch[1].points, seen) <= max_gap_m
         ]
         if touches:
-            _, number, vertex, curve = min(touches, key=lambda touch: touch[0])
+            *_, number, vertex, curve = min(touches, key=lambda touch: touch[:2])
             network = network.cut_back({end: curve.cuts_m[0]})
             network = network.with_end(end, curve.points[::-1], 0, at=(number, vertex))
     return network.tidy()
 
 
-def _touch(from_end: np.ndarray, line: np.ndarray) -> tuple[int, Bridge] | None:
-    """Find the vertex of a line from which another one, given from its end inward, branches off, and the curve."""
+def _touch(from_end: np.ndarray, line: np.ndarray, beyond: bool) -> tuple[int, Bridge] | None:
+    """Find the vertex of a line from which another one, given from its end inward, branches off, and the curve.
+
+    If this is `beyond` the end of the line, as where the cloud ends in a switch, the curve leads to this end.
+    """
     shared_m = _shared_m(from_end, line)
     if Polyline(from_end).length_m - shared_m < FIT_M:
         return None
@@ -189,9 +193,9 @@ def _touch(from_end: np.ndarray, line: np.ndarray) -> tuple[int, Bridge] | None:
         return None
     arc = PartingLaw.fitted(-own_x, np.abs(apart_m), ARC)
     touch_m = -arc.way_at(MISFIT_M)
-    if not 0 < touch_m < MAX_BACK_M:
+    if not 0 < touch_m < MAX_BACK_M or (touch_m >= x[-1]) != beyond:
         return None
-    touch_m = min(touch_m, x[-1] - DIRECTION_M)  # the toe of the switch may be beyond the end of the cloud
+    touch_m = min(touch_m, x[-1] - DIRECTION_M) if beyond else touch_m
     onward = way[int(np.abs(x - touch_m).argmin())]
     stock = line[onward:] if way[0] < way[-1] else line[onward::-1]
     curve = bridge(from_end, stock, misfit_m=KNOWN_MISFIT_M) if Polyline(stock).length_m >= DIRECTION_M else None
