@@ -91,7 +91,7 @@ DENSE = Tolerances(
     beside_m=0.02,
     least_m=LEAST_M,
     band=HEADS,
-    wider_m=0.040,
+    wider_m=0.036,
     wider_single_m=0.012,
 )
 """For scanners on vehicles: beams of a few millimetres, range noise up to 5 mm."""
