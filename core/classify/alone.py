@@ -69,13 +69,18 @@ def may_hide_partner(
     Lines are those of `cells`, (n,), on `piece`, (n,). A head differs by at most `height_m` from theirs; ground that is
     lower shows that there is none, where it is seen as often as on the way there.
     """
-    low_m = lines.height - height_m
+    low_m, across = lines.height - height_m, to_one_side(lines, piece)
     hidden = (mean_of(low_m, piece) < LOWEST_M) | (mean_of(lines.height, piece) > UNDER_FOOT_M)
+
+    def lower(places_m: np.ndarray) -> np.ndarray:
+        """Return the share of places beside each piece that show lower ground and nothing else, (pieces,)."""
+        found = [_is_lower(lines.axis + place_m * across, cells, low_m, tops) for place_m in places_m]
+        return mean_of(np.sum(found, axis=0), piece) / len(places_m)
+
     for left_m in [side * spacing_m for spacing_m in settings.spacings_m for side in (1, -1)]:
-        on_the_way = _lower(lines, piece, cells, left_m * WAY, low_m, tops)
+        on_the_way = lower(left_m * WAY)
         for place_m in left_m + SPACING_M * PLACES:
-            on_head = _lower(lines, piece, cells, place_m + settings.head_width_m * ON_HEAD, low_m, tops)
-            hidden |= on_head <= SHOWN * on_the_way
+            hidden |= lower(place_m + settings.head_width_m * ON_HEAD) <= SHOWN * on_the_way
     return hidden
 
 
@@ -109,19 +114,14 @@ def _slope(weight: np.ndarray, fall_m: np.ndarray) -> np.ndarray:
     return (weight * centred * fall_m).sum(axis=0) / (weight * centred**2).sum(axis=0)
 
 
-def _lower(
-    lines: Lines, piece: np.ndarray, cells: np.ndarray, places_m: np.ndarray, low_m: np.ndarray, tops: Tops
-) -> np.ndarray:
-    """Return the share of cells that show ground lower than `low_m`, (n,), and nothing else, for each piece, (pieces,).
+def _is_lower(xy: np.ndarray, cells: np.ndarray, low_m: np.ndarray, tops: Tops) -> np.ndarray:
+    """Return which places, (n, 2), show ground lower than `low_m`, (n,), above the bed and nothing else, (n,) bool.
 
-    They are at several places to one side of the lines. The vault over hidden ground is not lower ground.
+    They are beside `cells`, (n,). The vault over hidden ground is not lower ground.
     """
-    across, lower, z = to_one_side(lines, piece), np.zeros(len(piece)), tops.z.ravel()
-    for place_m in places_m:
-        cell, inside = tops.grid.cells(lines.axis + place_m * across)
-        seen = inside & tops.seen.ravel()[cell] & ~tops.high.ravel()[cell]
-        lower += seen & (tops.top.ravel()[cell] < low_m * MILLIMETRES) & (np.abs(z[cells] - z[cell]) < HIGH_M)
-    return mean_of(lower, piece) / len(places_m)
+    z, (cell, inside) = tops.z.ravel(), tops.grid.cells(xy)
+    seen = inside & tops.seen.ravel()[cell] & ~tops.high.ravel()[cell]
+    return seen & (tops.top.ravel()[cell] < low_m * MILLIMETRES) & (np.abs(z[cells] - z[cell]) < HIGH_M)
 
 
 def are_solid(lines: Lines, piece: np.ndarray, xy: np.ndarray, height: np.ndarray, head_width_m: float) -> np.ndarray:

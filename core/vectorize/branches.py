@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from itertools import combinations
+from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -155,24 +156,32 @@ def attach_branches(network: LineNetwork, seen: cKDTree, max_gap_m: float, progr
             continue
         near = np.flatnonzero(((from_end[0] > low) & (from_end[0] < high)).all(axis=1))
         touches = [
-            (beyond, touch[1].cost, number, *touch)
-            for beyond in (False, True)
+            (touch.beyond, touch.curve.cost, number, touch)
             for number in near.tolist()
-            if number != end // 2 and (touch := _touch(from_end, network.lines[number], beyond)) is not None
-            if unseen_m(touch[1].points, seen) <= max_gap_m
+            if number != end // 2 and (touch := _touch(from_end, network.lines[number])) is not None
+            if unseen_m(touch.curve.points, seen) <= max_gap_m
         ]
         if touches:
-            *_, number, vertex, curve = min(touches, key=lambda touch: touch[:2])
-            network = network.cut_back({end: curve.cuts_m[0]})
-            network = network.with_end(end, curve.points[::-1], 0, at=(number, vertex))
+            *_, number, touch = min(touches, key=lambda touch: touch[:2])
+            network = network.cut_back({end: touch.curve.cuts_m[0]})
+            network = network.with_end(end, touch.curve.points[::-1], 0, at=(number, touch.vertex))
     return network.tidy()
 
 
-def _touch(from_end: np.ndarray, line: np.ndarray, beyond: bool) -> tuple[int, Bridge] | None:
-    """Find the vertex of a line from which another one, given from its end inward, branches off, and the curve.
+class _Touch(NamedTuple):
+    """The vertex of a line from which another one branches off, and the curve that leads there.
 
-    If this is `beyond` the end of the line, as where the cloud ends in a switch, the curve leads to this end.
+    Where the law of an arc puts this `beyond` the end of the line, as where the cloud ends in a switch, the curve leads
+    to this end.
     """
+
+    vertex: int
+    curve: Bridge
+    beyond: bool
+
+
+def _touch(from_end: np.ndarray, line: np.ndarray) -> _Touch | None:
+    """Find where a line, given from its end inward, branches off another one."""
     shared_m = _shared_m(from_end, line)
     if Polyline(from_end).length_m - shared_m < FIT_M:
         return None
@@ -193,9 +202,10 @@ def _touch(from_end: np.ndarray, line: np.ndarray, beyond: bool) -> tuple[int, B
         return None
     arc = PartingLaw.fitted(-own_x, np.abs(apart_m), ARC)
     touch_m = -arc.way_at(MISFIT_M)
-    if not 0 < touch_m < MAX_BACK_M or (touch_m >= x[-1]) != beyond:
+    if not 0 < touch_m < MAX_BACK_M:
         return None
-    touch_m = min(touch_m, x[-1] - DIRECTION_M) if beyond else touch_m
+    beyond = bool(touch_m >= x[-1])
+    touch_m = x[-1] - DIRECTION_M if beyond else touch_m
     onward = way[int(np.abs(x - touch_m).argmin())]
     stock = line[onward:] if way[0] < way[-1] else line[onward::-1]
     curve = bridge(from_end, stock, misfit_m=KNOWN_MISFIT_M) if Polyline(stock).length_m >= DIRECTION_M else None
@@ -204,7 +214,7 @@ def _touch(from_end: np.ndarray, line: np.ndarray, beyond: bool) -> tuple[int, B
     further = int(np.searchsorted(Polyline(stock).t, curve.cuts_m[1]))
     vertex = int(onward + further if way[0] < way[-1] else onward - further)
     curve = replace(curve, cuts_m=(shared_m + curve.cuts_m[0], curve.cuts_m[1]))
-    return (vertex, curve) if 0 < vertex < len(line) - 1 else None
+    return _Touch(vertex, curve, beyond) if 0 < vertex < len(line) - 1 else None
 
 
 def _shared_m(from_end: np.ndarray, line: np.ndarray) -> float:
