@@ -68,6 +68,10 @@ BLENDED_ERROR_M, BLENDED_SHARE = 0.002, 0.5
 """Least standard error of the height of any blunt head, metres, and its share of this fall where images may blur it:
 what they show is not raised, because their blur may be of any size."""
 
+SHARED_ERROR_M = 0.015
+"""Standard error of the height of a ridge that is not alone, or is in a pavement, metres: alike over all of the run,
+because a second head beside it raises it by up to 20 mm."""
+
 LEAST_INFORMATION = 1e-6
 """Information about level, slope and fall of a crown that is always there, so that few points are enough."""
 
@@ -200,22 +204,29 @@ def are_sunk(t: np.ndarray, z: np.ndarray, rough_m: float = SUNK_ROUGH_M) -> np.
 def by_lone_ridge(top: Top, smoothing_m: float | None, prior: Prior) -> Top:
     """Take the height that a ridge shows where it is alone and out of its bed.
 
-    Next to another head both are one ridge, which is higher, and in a pavement no blur lowers the head. An end that
-    other heads are next to keeps what it shows.
+    Next to another head both are one ridge, which is higher, and in a pavement no blur lowers the head. What a ridge
+    shows there counts for little, and decides where it is far to where it is alone.
     """
     points = top.points
-    alone = np.flatnonzero(points.alone)
-    if not len(alone):
-        return top
-    inner = np.arange(len(points.t))
-    chosen = points.alone | (inner < alone[0]) | (inner > alone[-1])
-    chosen &= ~_raised_stations(top)[points.station]
+    chosen = points.alone & ~_raised_stations(top)[points.station]
     if chosen.all():
         return top
-    chosen &= points.within(AXIS_SHARE)
-    if chosen.sum() < MIN_POINTS:
+    central = points.within(AXIS_SHARE)
+    if (chosen & central).sum() < MIN_POINTS:
         return top
-    return replace(top, course=smoothed(points.t[chosen], top.level[chosen], smoothing_m, prior))
+    used = central if smoothing_m is None else chosen & central
+    t, level, lone = points.t[used], top.level[used], chosen[used]
+    noise_m = robust_sigma((level - top.course.at(t))[lone])
+    return replace(top, course=smoothed(t, level, smoothing_m, prior, _kept(lone, noise_m)))
+
+
+def _kept(lone: np.ndarray, noise_m: float) -> np.ndarray:
+    """Return the share of its information that each point of a ridge keeps, (n,): all of it where the ridge is alone.
+
+    The points of a run that is not have one error in common, so that together they tell as much as one measurement.
+    """
+    run = np.cumsum(np.diff(lone, prepend=lone[0]))
+    return np.where(lone, 1.0, np.minimum((noise_m / SHARED_ERROR_M) ** 2 / np.bincount(run)[run], 1.0))
 
 
 def _raised_stations(top: Top) -> np.ndarray:
@@ -262,15 +273,24 @@ def _raised(crown: Crown, points: HeadPoints) -> Crown:
     return replace(crown, level_m=max(share * fall_m, BLENDED_ERROR_M), lowered_m=lowered_m)
 
 
-def smoothed(t: np.ndarray, z: np.ndarray, smoothing_m: float | None, prior: Prior = SHARP) -> Course:
+def smoothed(
+    t: np.ndarray,
+    z: np.ndarray,
+    smoothing_m: float | None,
+    prior: Prior = SHARP,
+    kept: np.ndarray | float = 1.0,
+) -> Course:
     """Smooth heights of points at increasing chainages by PAEK or, with None, by a spline as much as points show.
 
-    Points of a bin are averaged, so that no single point marks the edge of a gap.
+    Points of a bin are averaged, so that no single point marks the edge of a gap. `kept` is the share of its
+    information that each point keeps.
     """
     rough = rough_level(t, z)
     noise_m = robust_sigma(z - rough)
-    _, number, count = np.unique(np.floor(t / PROFILE_BIN_M), return_inverse=True, return_counts=True)
-    middle, height = np.bincount(number, t) / count, np.bincount(number, z) / count
+    _, number = np.unique(np.floor(t / PROFILE_BIN_M), return_inverse=True)
+    kept = np.broadcast_to(kept, t.shape)
+    count = np.bincount(number, kept)
+    middle, height = np.bincount(number, kept * t) / count, np.bincount(number, kept * z) / count
     if smoothing_m is None:
         return smooth(middle, height, count / noise_m**2, middle[0] - TAIL_M, middle[-1] + TAIL_M, None, prior)
     reach_m = 0.5 * smoothing_m / VARIANCE_FACTOR

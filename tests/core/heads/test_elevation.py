@@ -174,6 +174,28 @@ def test_ridges_of_a_branch_and_its_stock_rail_that_are_one_do_not_lift_either()
 
 
 @pytest.mark.parametrize("seed", range(3))
+def test_a_ridge_that_two_heads_share_for_long_tells_of_a_change_of_grade(seed):
+    """35 m of two rails are one ridge, 11 mm too high, and the 5 m beyond do not show a grade of their own."""
+    stock, x = straight_line(75), np.arange(0, 75.05, 0.1)
+    other = np.column_stack([x, 0.13 + np.maximum(35 - x, 0) ** 2 / 40 + np.maximum(x - 70, 0) ** 2 / 40])
+    rng = np.random.default_rng(seed)
+    matching = gaussian_filter1d(rng.normal(0, 1, 1501), 5)
+    matching *= 0.008 / matching.std()
+
+    def profile(x):
+        return np.maximum(x - 40, 0) ** 2 / 6000
+
+    t, y = rng.uniform(0, 75, 40000), rng.uniform(-0.3, 4, 40000)
+    away = y - np.interp(t, *other.T)
+    near = (np.abs(y) < 0.12) | (np.abs(away) < 0.12)
+    up = 0.1 * np.exp(-0.5 * (y / 0.06) ** 2) + 0.1 * np.exp(-0.5 * (away / 0.06) ** 2) + rng.normal(0, 0.004, len(t))
+    up += profile(t) + np.interp(t, 0.05 * np.arange(1501), matching) - 0.1
+    points = cloud_of(np.column_stack([t, y, up])[near])
+    rail = min(elevated(network_of(stock, other), points), key=lambda one: np.abs(one.xyz[:, 1]).max())
+    assert np.abs(rail.xyz[:, 2] - profile(rail.xyz[:, 0])).max() < 0.015
+
+
+@pytest.mark.parametrize("seed", range(3))
 def test_waves_of_the_track_are_no_errors_of_matching(seed):
     """Ridges of images are up to 2 cm too high or low, alike over half a metre; the track rises and falls over 60 m."""
     rng = np.random.default_rng(seed)
