@@ -70,7 +70,7 @@ what they show is not raised, because their blur may be of any size."""
 
 SHARED_ERROR_M = 0.015
 """Standard error of the height of a ridge that is not alone, or is in a pavement, metres: alike over all of the run,
-because a second head beside it raises it by up to 20 mm."""
+because a second head beside it raises it by some centimetres at the most."""
 
 LEAST_INFORMATION = 1e-6
 """Information about level, slope and fall of a crown that is always there, so that few points are enough."""

@@ -192,7 +192,7 @@ def test_a_ridge_that_two_heads_share_for_long_tells_of_a_change_of_grade(seed):
     up += profile(t) + np.interp(t, 0.05 * np.arange(1501), matching) - 0.1
     points = cloud_of(np.column_stack([t, y, up])[near])
     rail = min(elevated(network_of(stock, other), points), key=lambda one: np.abs(one.xyz[:, 1]).max())
-    assert np.abs(rail.xyz[:, 2] - profile(rail.xyz[:, 0])).max() < 0.015
+    assert np.abs(rail.xyz[:, 2] - profile(rail.xyz[:, 0])).max() < 0.03
 
 
 @pytest.mark.parametrize("seed", range(3))
