@@ -7,7 +7,7 @@ from rail_extract.core.classify.settings import Settings
 from rail_extract.core.classify.square import classify_square
 from rail_extract.core.classify.tops import Grid
 from rail_extract.core.classify.ways import Way
-from rail_extract.laboratory.scenes.raw_shapes import flat, rough, turned
+from rail_extract.laboratory.scenes.raw_shapes import flat, rough, turned, with_bar
 
 CELL_M, SIDE = 0.04, 120
 SCATTER_M = 0.01
@@ -90,3 +90,14 @@ def slabs_beside_a_ditch() -> np.ndarray:
 
 def test_edges_to_which_the_ground_leads_up_are_no_heads():
     assert not classify_square(slabs_beside_a_ditch(), Settings((1.435,), 0.072, way=Way.FILLED)).rail.any()
+
+
+@pytest.mark.parametrize(("slope", "is_track"), [(0.0, True), (0.12, True), (0.4, False)])
+def test_no_track_is_steeper_across_than_its_cant(slope, is_track):
+    """The edges of a bank and of its berm may be at gauge from each other (world 14682)."""
+    xyz, half_m = flat(16.0, rng=np.random.RandomState(4), per_m2=2000), 0.5 * (1.435 + 0.072)
+    ground = rough(xyz + np.outer(slope * turned(xyz, 0.0)[1], [0.0, 0.0, 1.0]), np.random.RandomState(5), 0.004)
+    for left_m in (half_m, -half_m):
+        ground = with_bar(ground, 0.072, left_m=left_m, height_m=0.025)[0]
+    rail = classify_square(ground, Settings((1.435,), 0.072, way=Way.FILLED)).rail
+    assert rail.any() == is_track
