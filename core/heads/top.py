@@ -16,7 +16,7 @@ from ..rails import Support
 from .head_points import RIM_HEADS, HeadPoints
 from .level import AXIS_SHARE, OFF_TOP_SIGMAS, SLOPE_ROUNDS, cross_slope, robust_sigma, rough_level
 from .outline import CROWN_RADIUS_M
-from .sections import Middles
+from .sections import COURSE_STATIONS, Middles
 from .smoother import SHARP, Prior, Spline, bridge_error, smooth
 
 MIN_POINTS = 10
@@ -166,6 +166,7 @@ def by_outline(top: Top, outline: Middles) -> Top:
     count = points.per_station()
     mean_m = points.per_station(flat) / np.maximum(count, 1)
     outlined = np.isfinite(outline.top) & (outline.top_information > 0)
+    outlined &= ~_are_below(np.where(outlined & (count > 0), outline.top - mean_m, np.nan))
     by_points = count / robust_sigma(flat - top.course.at(points.t)) ** 2
     information = np.where(outlined, outline.top_information, by_points)
     values = np.where(outlined, outline.top, mean_m)
@@ -177,6 +178,15 @@ def by_outline(top: Top, outline: Middles) -> Top:
     course = smooth(t, values, information[known], -TAIL_M, points.length_m + TAIL_M)
     common_m = np.where(outlined, outline.top_common, top.crown_m)[known]
     return replace(top, course=course, crown_m=np.interp(stations, t, course.followed(t, common_m, information[known])))
+
+
+def _are_below(above_m: np.ndarray) -> np.ndarray:
+    """Return at which stations the top of the outline, `above_m` the points on the head, (s,), is below these, bool.
+
+    Far from the scanner, most points of a section may be of one face and of the web, and its outline is fitted to both.
+    """
+    total_m = uniform_filter1d(np.nan_to_num(above_m), COURSE_STATIONS, mode="constant")
+    return total_m < -SUNK_M / 2 * uniform_filter1d(np.isfinite(above_m) * 1.0, COURSE_STATIONS, mode="constant")
 
 
 def are_sunk(t: np.ndarray, z: np.ndarray, rough_m: float = SUNK_ROUGH_M) -> np.ndarray:

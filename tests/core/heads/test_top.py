@@ -1,8 +1,12 @@
 """The top of a head: the disc that rolls along it, and its profile beyond its ends."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from rail_extract.core.heads.top import TAIL_M, Profile, are_sunk, rolling_disc
+from rail_extract.core.heads.head_points import HeadPoints, stations_along
+from rail_extract.core.heads.sections import Middles
+from rail_extract.core.heads.top import TAIL_M, Profile, Top, are_sunk, by_outline, rolling_disc
 
 
 def profile_of(t, z):
@@ -68,3 +72,18 @@ def test_waves_steps_and_what_stands_on_a_head_are_not_sunk():
     for above_m in (0.0, 0.03 * step, 0.05 * vehicle):
         assert not are_sunk(PLACES_M, WAVY_M + above_m).any()
     assert not are_sunk(PLACES_M[:0], WAVY_M[:0]).any()
+
+
+@pytest.mark.parametrize("below_m", [0.0, 0.03])
+def test_no_head_is_lower_than_the_points_on_it(below_m):
+    """Far from a tripod, the outline was fitted to one face and the web, and was 3 cm low for 35 m (world 14657)."""
+    rng = np.random.default_rng(1)
+    t, stations = np.sort(rng.uniform(0, 80, 3200)), stations_along(80.0)
+    z, across = rng.normal(0, 0.004, len(t)), rng.uniform(-0.03, 0.03, len(t))
+    line = np.array([[0.0, 0.0], [80.0, 0.0]])
+    points = HeadPoints(t, across, z, 0.072, line, np.ones((2, len(stations)), dtype=bool))
+    shown = np.where(np.abs(stations - 40) < 17, -below_m, 0.0) + rng.normal(0, 0.003, len(stations))
+    known = np.full(len(stations), 0.003**-2)
+    outline = replace(Middles.unknown(len(stations)), top=shown, top_information=known, top_common=0 * known)
+    top = Top(profile_of(stations, 0 * stations), points, np.zeros(len(t)))
+    assert np.abs(by_outline(top, outline).course.at(stations)).max() < 0.006
