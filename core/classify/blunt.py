@@ -6,17 +6,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from .cells import Kept, Shown, Standing, as_wanted, fitting
+from .cells import Kept, Shown, Standing, are_paired, as_wanted, fitting
 from .labels import Near, label
 from .lines import SINGLE_COVER, Lines, joined
 from .partner import off_gauge
-from .pieces import links, mean_of, pieces_of, with_partner
+from .pieces import LEAST_PAIRED, links, mean_of, pieces_of, with_partner
 from .ridges import Ridges, cells_beside, mean_along, on_crests, sides_of
 from .settings import BLUNT, Settings
 
 WIDER_M = 0.03
-"""How much wider half-way down than most ridges of the square one is that has more than one head in it. Up to 20 mm
-more, crests are 8 mm off the axis (median in four worlds from images), from 40 mm on 38 to 55 mm."""
+"""How much wider half-way down than most ridges of one head in the square one is that has more heads in it. Up to 20
+mm more, crests are 8 mm off the axis (median in four worlds from images), from 40 mm on 38 to 55 mm."""
 
 AVERAGED_M = 1.0
 """Length to either side over which this is averaged: that of single cells scatters by 12 mm."""
@@ -39,9 +39,12 @@ def on_ridges(kept: Kept, thin: bool, shown: Shown, settings: Settings) -> Stand
         ridges = Ridges.measure(shown.xy, shown.height, kept.lines, piece)
         blur_m = ridges.blur_m
         heads = ridges.may_be_heads(settings.head_width_m)
+        of_one = kept.cell[heads[piece]]
+        heads |= _are_beside_heads(kept, piece, ridges, settings)
         heads &= mean_of(kept.lines.cover, piece) >= SINGLE_COVER  # sleepers show gaps in images, and rails none
         kept = fitting(kept, piece, heads, settings, BLUNT)
-        kept = _on_heads(kept, on_crests(shown.xy, shown.height, kept.lines, blur_m), shown, settings)
+        crests = on_crests(shown.xy, shown.height, kept.lines, blur_m)
+        kept = _on_heads(kept, crests, np.isin(kept.cell, of_one), shown, settings)
     cells = cells_beside(shown.tops.grid, kept.lines, settings.head_width_m / 2 + BLUNT.beside_m)
     chosen = label(shown.tops, cells, shown.cell, shown.height, BLUNT)
     beside = Near.find(shown.xy[chosen], kept.lines)
@@ -49,17 +52,31 @@ def on_ridges(kept: Kept, thin: bool, shown: Shown, settings: Settings) -> Stand
     return replace(as_wanted(kept, every, chosen, beside, thin, settings, BLUNT), blur_m=blur_m)
 
 
-def _on_heads(kept: Kept, crests: Lines, shown: Shown, settings: Settings) -> Kept:
+def _are_beside_heads(kept: Kept, piece: np.ndarray, ridges: Ridges, settings: Settings) -> np.ndarray:
+    """Return which pieces, of (n,) cells, may be two heads side by side: their partner is one, (pieces,) bool.
+
+    Images blur a rail and its guard rail to one ridge. A wall is as wide, but so is the wall at its side.
+    """
+    one, two = (find(settings.head_width_m) for find in (ridges.may_be_heads, ridges.may_be_two_heads))
+    for number in np.flatnonzero(two & ~one):
+        own = piece == number
+        among = own | (one & (ridges.width_m < ridges.width_m[number] - WIDER_M))[piece]
+        two[number] = are_paired(kept.lines.of(among), settings, BLUNT)[own[among]].mean() >= LEAST_PAIRED
+    return two
+
+
+def _on_heads(kept: Kept, crests: Lines, of_one: np.ndarray, shown: Shown, settings: Settings) -> Kept:
     """Move cells onto the crests of their ridges, and those of wide ridges onto the heads at their sides.
 
-    Two heads side by side, as of a check or wing rail, are one ridge, with a head at either side. Each is a rail if it
-    is at gauge from another one, and both only if the ridge is as wide as two. If neither is, the crest stays.
+    Two heads side by side, as of a check or wing rail, are one ridge with a head at either side, wider than most that
+    are `of_one`, (n,) bool. Each is a rail if it is at gauge from another one, and both only if the ridge is as wide as
+    two. If neither is, the crest stays.
     """
     left_m, right_m = sides_of(shown.mean_heights(), shown.tops.grid, kept.lines)
     width_m = left_m + right_m
-    if not np.isfinite(width_m).any():
+    if not np.isfinite(width_m[of_one]).any():
         return replace(kept, lines=crests)
-    head_m = float(np.nanmedian(width_m))
+    head_m = float(np.nanmedian(width_m[of_one]))
     wider_m = mean_along(width_m - head_m, kept.lines, AVERAGED_M)
     is_wide = (wider_m > WIDER_M) & np.isfinite(width_m)
     wide, narrow = np.flatnonzero(is_wide), np.flatnonzero(~is_wide)

@@ -48,6 +48,9 @@ WIDER_M = 0.048
 images that blur by 2 to 8 cm 0 to 40 mm; a head with a guard rail beside it and walls of earth between fields 55 mm and
 more."""
 
+NEXT_HEAD_M = 0.12
+"""How much wider the ridge of a rail and a guard, check or wing rail beside it is: the distance of their axes."""
+
 LEVEL_M = 0.035
 """Difference in height above the bed between the two ridges of a track, averaged as their axes are: measured 0 to 24 mm
 over a piece; a low wall at gauge from a rail 49 and 54 mm."""
@@ -130,6 +133,10 @@ class Ridges:
         """Return which ridges are as narrow as a head, (pieces,) bool."""
         with np.errstate(invalid="ignore"):
             return self.width_m < head_width_m + WIDER_M
+
+    def may_be_two_heads(self, head_width_m: float) -> np.ndarray:
+        """Return which ridges are as narrow as two heads side by side, (pieces,) bool."""
+        return self.may_be_heads(head_width_m + NEXT_HEAD_M)
 
 
 def on_crests(xy: np.ndarray, height: np.ndarray, lines: Lines, blur_m: float, reach_m: float = REACH_M) -> Lines:

@@ -90,6 +90,18 @@ def test_a_rail_is_at_gauge_beside_the_check_rail_with_which_it_is_one_ridge(sid
         assert abs(np.mean(x[beside]) - rail_m) < 0.015
 
 
+@pytest.mark.parametrize("blur_m", [0.04, 0.05])
+def test_a_rail_is_at_gauge_beside_a_guard_rail_as_long_as_it(blur_m):
+    """The ridge of both is too wide for one head, and half of all ridges are (worlds 14757 and 14851)."""
+    xyz = with_check_rails(bars(MATCHED_M, 0.17, blur_m), blur_m, (-1, 0), first_m=0.0, last_m=SIDE_M)
+    rail = classify_square(xyz, Settings((GAUGE_M,), WIDTH_M, way=Way.BLUNT)).rail
+    x = xyz[rail, 0]
+    for rail_m in 7.0 + (GAUGE_M + WIDTH_M) * np.array([-0.5, 0.5]):
+        near = np.abs(x - rail_m) < 0.2
+        assert np.count_nonzero(near) > 0.4 * len(x)
+        assert abs(np.mean(x[near]) - rail_m) < 0.015
+
+
 def lines_beside(across_m):
     """Cells of a line along x, 4 cm apart, with their axes aside."""
     along_m = 0.04 * np.arange(len(across_m))
