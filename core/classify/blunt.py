@@ -15,8 +15,9 @@ from .ridges import Ridges, cells_beside, mean_along, on_crests, sides_of
 from .settings import BLUNT, Settings
 
 WIDER_M = 0.03
-"""How much wider half-way down than most ridges of one head in the square one is that has more heads in it. Up to 20
-mm more, crests are 8 mm off the axis (median in four worlds from images), from 40 mm on 38 to 55 mm."""
+"""How much wider half-way down than most ridges of one head in the square one is that has more heads in it, and a
+quarter of the way down than its partner. Up to 20 mm more, crests are 8 mm off the axis (median in four worlds from
+images), from 40 mm on 38 to 55 mm."""
 
 AVERAGED_M = 1.0
 """Length to either side over which this is averaged: that of single cells scatters by 12 mm."""
@@ -38,9 +39,9 @@ def on_ridges(kept: Kept, thin: bool, shown: Shown, settings: Settings) -> Stand
         piece = pieces_of(len(kept.cell), kept.pairs)
         ridges = Ridges.measure(shown.xy, shown.height, kept.lines, piece)
         blur_m = ridges.blur_m
-        heads = ridges.may_be_heads(settings.head_width_m)
-        of_one = kept.cell[heads[piece]]
-        heads |= _are_beside_heads(kept, piece, ridges, settings)
+        one = ridges.may_be_heads(settings.head_width_m)
+        of_one = kept.cell[one[piece]]
+        heads = one | _are_two(kept, piece, ridges, one, settings)
         heads &= mean_of(kept.lines.cover, piece) >= SINGLE_COVER  # sleepers show gaps in images, and rails none
         kept = fitting(kept, piece, heads, settings, BLUNT)
         crests = on_crests(shown.xy, shown.height, kept.lines, blur_m)
@@ -52,13 +53,13 @@ def on_ridges(kept: Kept, thin: bool, shown: Shown, settings: Settings) -> Stand
     return replace(as_wanted(kept, every, chosen, beside, thin, settings, BLUNT), blur_m=blur_m)
 
 
-def _are_beside_heads(kept: Kept, piece: np.ndarray, ridges: Ridges, settings: Settings) -> np.ndarray:
-    """Return which pieces, of (n,) cells, may be two heads side by side: their partner is one, (pieces,) bool.
+def _are_two(kept: Kept, piece: np.ndarray, ridges: Ridges, one: np.ndarray, settings: Settings) -> np.ndarray:
+    """Return which pieces, of (n,) cells, are two heads side by side whose partner is `one`, (pieces,) bool each.
 
     Images blur a rail and its guard rail to one ridge. A wall is as wide, but so is the wall at its side.
     """
-    one, two = (find(settings.head_width_m) for find in (ridges.may_be_heads, ridges.may_be_two_heads))
-    for number in np.flatnonzero(two & ~one):
+    two = ridges.may_be_two_heads(settings.head_width_m) & ~one
+    for number in np.flatnonzero(two):
         own = piece == number
         among = own | (one & (ridges.width_m < ridges.width_m[number] - WIDER_M))[piece]
         two[number] = are_paired(kept.lines.of(among), settings, BLUNT)[own[among]].mean() >= LEAST_PAIRED

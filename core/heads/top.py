@@ -292,8 +292,8 @@ def smoothed(
 ) -> Course:
     """Smooth heights of points at increasing chainages by PAEK or, with None, by a spline as much as points show.
 
-    Points of a bin are averaged, so that no single point marks the edge of a gap. `kept` is the share of its
-    information that each point keeps.
+    Points of a bin are averaged, so that no single point marks the edge of a gap. `kept`, (n,) or one for all,
+    is the share of its information that each point keeps.
     """
     rough = rough_level(t, z)
     noise_m = robust_sigma(z - rough)
