@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from ..polyline import Polyline
 from ..progress import counted, metres
 from ..rails import STRIP_OFF_M, Centerline, HeadWidths, RailLine, RailNetwork, TrackGeometry, cell_borders
 from ..spread import known, median, rms
 from .doubts import ARM_M, find_jumps
+from .ends import EarlyEnd, Hole, ends_of, find_early_ends, find_holes
 
 GAUGE_OFF_MM = 10.0
 """Plain track is not left in service with a larger deviation from its gauge. Curves of less than 200 m radius are
@@ -35,16 +35,6 @@ SILENT_SHARE = 0.02
 """Share of the length in doubt for a reason that the stations of tracks do not show, above which a result is not good
 throughout."""
 
-MAX_HOLE_M = 200.0
-"""Longest section without any rail across which two tracks are recognized as one: longer ones may hide a switch."""
-
-END_M = 20.0
-"""Length of the end of a track that shows its direction."""
-
-HOLE_RADIUS_M, HOLE_MISS_DEG = 150.0, 1.5
-"""Smallest radius of a curve in a hole, and largest angle by which its chord may differ from the mean direction of the
-two tracks, which it equals on an arc."""
-
 FEW, MANY = 0.05, 0.25
 """Share of the length in doubt up to which a result is good with a few exceptions, and above which it is poor."""
 
@@ -54,7 +44,11 @@ rail, and being further off makes it no worse."""
 
 STEP = "the track steps {:.0f} mm to the side"
 
-LONE_RAIL, HOLE = "a rail belongs to no track", "no rails were found between tracks {} and {}, which are likely one"
+LONE_RAIL, HOLE, EARLY_END = (
+    "a rail belongs to no track",
+    "no rails were found between tracks {} and {}, which are likely one",
+    "the track ends {:.0f} m before track {} beside it: more of its rails may be there",
+)
 
 VERDICTS = (
     (0.0, "good", "Good throughout: every metre is supported by points, at gauge, with a small standard error."),
@@ -126,20 +120,11 @@ class TrackFindings:
 
 
 @dataclass(frozen=True)
-class Hole:
-    """A section without rails between two tracks that are likely one; `ends`, (2, 3), are theirs in local metres."""
-
-    first: int
-    second: int
-    length_m: float
-    ends: np.ndarray
-
-
-@dataclass(frozen=True)
 class Findings:
     """The findings on all tracks, and on what the stations of tracks do not show.
 
-    `lonely` rails belong to no track, and `rails_m` is the length of all rails. `heads` has the width of the heads only
+    `lonely` rails belong to no track, and `rails_m` is the length of all rails. Tracks with `early_ends` may be right:
+    they are places to look at, and nothing is in doubt for them. `heads` has the width of the heads only
     if another one is stated. `stepped_m` is the plan length of the tracks that step to the side: on one side of a step,
     all of it is off.
     """
@@ -148,6 +133,7 @@ class Findings:
     lonely: tuple[RailLine, ...] = ()
     rails_m: float = 0.0
     holes: tuple[Hole, ...] = ()
+    early_ends: tuple[EarlyEnd, ...] = ()
     heads: HeadWidths | None = None
     stepped_m: float = 0.0
 
@@ -194,12 +180,14 @@ def examine(network: RailNetwork, gauges_m: Sequence[float]) -> Findings:
         _examine_track(line, geometry[line.track_id], gauges_m, find_jumps(line, network.rails))
         for line in network.centerlines
     )
-    heads = network.heads
+    heads, ends = network.heads, list(ends_of(network.centerlines))
+    holes = tuple(find_holes(ends))
     return Findings(
         tracks,
         _lonely(network),
         float(sum(rail.length_m for rail in network.rails)),
-        tuple(_holes(network.centerlines)),
+        holes,
+        tuple(find_early_ends(ends, holes)),
         heads if heads is not None and heads.differ else None,
         sum(track.length_m for track in tracks if track.steps),
     )
@@ -212,56 +200,6 @@ def _lonely(network: RailNetwork) -> tuple[RailLine, ...]:
         return ()
     paired = {rail_id for ids in named for rail_id in ids}
     return tuple(rail for rail in network.rails if rail.rail_id not in paired)
-
-
-def _holes(lines: Sequence[Centerline]) -> Iterator[Hole]:
-    """Find ends of tracks that lead to each other on an arc, the nearest first; each end leads to one other."""
-    ends = [
-        (number, end[0], _outward(end))
-        for number, line in enumerate(lines)
-        for end in (line.xyz, line.xyz[::-1])
-        if not _is_met(end[0, :2], number, lines)
-    ]
-    found = []
-    for one, (first, place, outward) in enumerate(ends):
-        for other, (second, target, back) in enumerate(ends[:one]):
-            way = (target - place)[:2]
-            length_m = float(np.hypot(*way))
-            if first == second or not 0 < length_m <= MAX_HOLE_M:
-                continue
-            leaving, arriving = _angle(outward, way), _angle(way, -back)
-            bend = length_m / HOLE_RADIUS_M
-            if abs(leaving - arriving) / 2 <= np.radians(HOLE_MISS_DEG) and abs(leaving + arriving) <= bend:
-                found.append((length_m, one, other))
-    used: set[int] = set()
-    for length_m, one, other in sorted(found):
-        if one not in used and other not in used:
-            used |= {one, other}
-            met = sorted((lines[ends[end][0]].track_id, end) for end in (one, other))
-            (first, _), (second, _) = met
-            yield Hole(first, second, length_m, np.stack([ends[end][1] for _, end in met]))
-
-
-def _outward(end: np.ndarray) -> np.ndarray:
-    """Return the unit vector out of a line at its first vertex, from the vertices, (n, 3), within `END_M` of it.
-
-    An arc through the end, the middle and the last of them gives the direction at the end itself.
-    """
-    line = Polyline(end[:, :2])
-    reach_m = min(END_M, line.length_m)
-    near, far = line.at(np.array([reach_m / 2, reach_m]))
-    outward = 3 * end[0, :2] - 4 * near + far
-    return outward / np.hypot(*outward)
-
-
-def _angle(one: np.ndarray, other: np.ndarray) -> float:
-    """Return the angle from one direction to another, radians, positive to the left."""
-    return float(np.arctan2(one[0] * other[1] - one[1] * other[0], one @ other))
-
-
-def _is_met(place: np.ndarray, number: int, lines: Sequence[Centerline]) -> bool:
-    """Return whether another track passes an end of track `number` or begins there."""
-    return any(len(line.line.feet(place[None], 1.0).t) > 0 for other, line in enumerate(lines) if other != number)
 
 
 def _examine_track(
@@ -352,7 +290,12 @@ def list_findings(network: RailNetwork, gauges_m: Sequence[float]) -> tuple[Find
 
 def listed(findings: Findings) -> tuple[Finding, ...]:
     """Return the places that an examination found, in order of decreasing harm."""
-    found = [*_of_tracks(findings), *map(_of_hole, findings.holes), *map(_of_lone_rail, findings.lonely)]
+    found = [
+        *_of_tracks(findings),
+        *map(_of_hole, findings.holes),
+        *map(_of_early_end, findings.early_ends),
+        *map(_of_lone_rail, findings.lonely),
+    ]
     found.sort(key=lambda one: -one.harm)
     return tuple(replace(one, finding=number) for number, one in enumerate(found, start=1))
 
@@ -434,6 +377,11 @@ def _of_step(track: TrackFindings, at_m: float, size_mm: float) -> Finding:
 def _of_hole(hole: Hole) -> Finding:
     reason = HOLE.format(hole.first, hole.second)
     return Finding(reason, hole.ends, OFF_RAIL_MM * hole.length_m, hole.length_m, track_id=hole.first)
+
+
+def _of_early_end(end: EarlyEnd) -> Finding:
+    reason = EARLY_END.format(end.length_m, end.beside)
+    return Finding(reason, end.xyz, OFF_RAIL_MM * end.length_m, end.length_m, track_id=end.track_id)
 
 
 def _of_lone_rail(rail: RailLine) -> Finding:
