@@ -164,6 +164,10 @@ class Polyline:
         beside = np.abs(share - 0.5) < PAST_END
         return np.where(beside, self.t[last] + share * np.diff(self.t)[last], np.nan), np.where(beside, across, np.nan)
 
+    def feet_of(self, xy: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return chainages of the feet of points, (k, 2), however far, and distances to the left; NaN past both ends."""
+        return self.feet_near(xy, self.t[cKDTree(self.xy).query(xy)[1]])
+
     @cached_property
     def _chords(self) -> Chords:
         return Chords.of([Polyline(self.xy)], STATION_M)

@@ -127,8 +127,7 @@ def find_early_ends(ends: Sequence[End], holes: Sequence[Hole]) -> Iterator[Earl
 def _beside(end: End, line: Centerline) -> EarlyEnd | None:
     """Return how a track goes on beside another one; None if its last `END_M` do not run beside it."""
     places, way = np.stack([end.xyz[:2], end.inside]), line.line
-    nearest = np.argmin(np.hypot(*(way.xy[:, None] - places).transpose(2, 0, 1)), axis=0)
-    (at_m, from_m), (left_m, before_m) = way.feet_near(places, way.t[nearest])
+    (at_m, from_m), (left_m, before_m) = way.feet_of(places)
     if not (abs(left_m) <= BESIDE_M and abs(left_m - before_m) <= SPREAD_M):
         return None
     ahead = at_m >= from_m
