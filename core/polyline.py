@@ -165,7 +165,7 @@ class Polyline:
         return np.where(beside, self.t[last] + share * np.diff(self.t)[last], np.nan), np.where(beside, across, np.nan)
 
     def feet_of(self, xy: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return chainages of the feet of points, (k, 2), however far, and distances to the left; NaN past both ends."""
+        """Return chainages of the feet of points, (k, 2), and distances to the left; NaN past both ends."""
         return self.feet_near(xy, self.t[cKDTree(self.xy).query(xy)[1]])
 
     @cached_property

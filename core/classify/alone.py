@@ -54,12 +54,6 @@ from above, it hides its web, and fastenings beside it give 0.45."""
 MIN_POINTS = 20
 """Points on a face that show where it is."""
 
-BESIDE_LINE_M = np.arange(0.12, 0.37, 0.04)
-"""Distances from the axis between which the ground falls away from a crest: from beyond most of the foot on."""
-
-LEAST_SEEN, LEAST_PLACES = 0.1, 4
-"""Share of the cells of a bar beside which the ground is seen at a distance, and distances that show a slope."""
-
 
 def may_hide_partner(
     lines: Lines, piece: np.ndarray, cells: np.ndarray, tops: Tops, settings: Settings, height_m: float
@@ -82,36 +76,6 @@ def may_hide_partner(
         for place_m in left_m + SPACING_M * PLACES:
             hidden |= lower(place_m + settings.head_width_m * ON_HEAD) <= SHOWN * on_the_way
     return hidden
-
-
-def slopes_beside(lines: Lines, piece: np.ndarray, cells: np.ndarray, tops: Tops) -> np.ndarray:
-    """Slope at which the ground falls away beside each piece, on the side where it is flatter if both are seen.
-
-    Lines are those of `cells`, (n,), on `piece`, (n,); returns (pieces,), 0 where neither side is seen. Heights as such
-    are compared: the planes of the bed do not follow a slope of more than `bed.NEIGHBOUR_M` from one cell to the next.
-    """
-    count, z = int(piece.max()) + 1 if len(piece) else 0, tops.z.ravel()
-    across, slopes = to_one_side(lines, piece), np.full((2, count), np.inf)
-    for number, side in enumerate((1, -1)):
-        seen, fall = np.zeros((2, len(BESIDE_LINE_M), count))
-        for place, beside_m in enumerate(BESIDE_LINE_M):
-            cell, inside = tops.grid.cells(lines.axis + side * beside_m * across)
-            fall_m = z[cells] - z[cell]
-            near = inside & (np.abs(fall_m) < HIGH_M)
-            seen[place] = np.bincount(piece[near], minlength=count)
-            fall[place] = np.bincount(piece[near], fall_m[near], count) / np.maximum(seen[place], 1)
-        weight = (seen > LEAST_SEEN * np.bincount(piece, minlength=count)).astype(float)
-        enough = weight.sum(axis=0) >= LEAST_PLACES
-        slopes[number, enough] = _slope(weight[:, enough], fall[:, enough])
-    slope = slopes.min(axis=0)
-    return np.where(np.isfinite(slope), slope, 0.0)
-
-
-def _slope(weight: np.ndarray, fall_m: np.ndarray) -> np.ndarray:
-    """Slope of the line of best fit through falls at `BESIDE_LINE_M`, (distances, k), with weights, (k,)."""
-    total, place = weight.sum(axis=0), BESIDE_LINE_M[:, None]
-    centred = place - (weight * place).sum(axis=0) / total
-    return (weight * centred * fall_m).sum(axis=0) / (weight * centred**2).sum(axis=0)
 
 
 def _is_lower(xy: np.ndarray, cells: np.ndarray, low_m: np.ndarray, tops: Tops) -> np.ndarray:

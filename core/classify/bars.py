@@ -7,25 +7,24 @@ from dataclasses import replace
 
 import numpy as np
 
-from .alone import UNDER_FOOT_M, are_solid, may_hide_partner, slopes_beside
+from .alone import UNDER_FOOT_M, are_solid, may_hide_partner
 from .cells import (
+    STEEP,
     Candidates,
     Kept,
     Shown,
     Standing,
     are_certain,
-    are_free,
     are_long,
     are_paired,
     as_wanted,
-    fitted_again,
     own_lengths,
 )
 from .labels import Near, label, whole_heads
 from .lines import Marks
-from .partner import MAJORITY, SPACING_M, have_partners, partner_sides, rise_above, runs_inside
-from .pieces import LEAST_SINGLE_M, cross_over, lengths, mean_of, pieces_of, with_partner
-from .ridges import Ridges
+from .partner import MAJORITY, SPACING_M, partner_sides, rise_above, runs_inside
+from .pieces import LEAST_SINGLE_M, lengths, mean_of, pieces_of, with_partner
+from .ridges import Ridges, above_sides
 from .settings import Settings, Tolerances
 from .tops import LOW_M
 
@@ -50,20 +49,9 @@ SINGLE_WIDTH = 0.2
 the ground falls beside it, as at the edge of a road: measured 2 to 4 mm. Heads measure 68 mm, and 19 mm where a train
 hides most of them."""
 
-SINGLE_SLOPE = 0.3
-"""Steepest bed of a rail without a partner: cant of 180 mm is 0.12, and a shoulder beside the rail makes it 0.22 at
-most; at the shoulder of a ballast bed it is 0.67. Where the far side of a slope is hidden, its crest looks like a bar
-on a bed of 0.38 and more."""
-
-SINGLE_FALL = 0.6
-"""Steepest fall of the ground beside a rail without a partner, on the flatter side that is seen. Planes of the bed do
-not follow slopes of 0.7 and more: cells of 0.5 m then differ by more than neighbours may. Measured: 0.93 to 1.0 at the
-crest of a cutting, 0.05 and 0.15 on both sides of one rail."""
-
-SINGLE_DEPTH = 0.4
-"""Share of its height above the bed by which the ground on either side of a rail without a partner is lower. The plane
-of the bed bends at the crest of a bank, which then seems to be high. Measured: 0.31 to 0.35 there, and 0.55 and more
-on rails beside which the ground is seen."""
+SINGLE_RISE_M = 0.06
+"""Least height of a rail without a partner above the ground on either side as it would go on below: half of
+`SINGLE_HEIGHT_M`. The ground leads up to the crest of a bank, or on to the edge of a cutting."""
 
 SHARP_WIDER_M = 0.011
 """Width beyond that of a head up to which a piece shows that the cloud is sharp. Measured over half of the rails of a
@@ -80,8 +68,6 @@ def on_bars(
 ) -> Standing:
     """Keep the cells of pieces that are as narrow as a head."""
     cells = _completed(found, kept, settings, tolerances)
-    if not thin:  # all cells are needed where they are few
-        kept = fitted_again(kept, cells, found, tolerances, settings)
     heads = whole_heads(shown.tops, cells, tolerances)
     chosen = label(shown.tops, heads, shown.cell, shown.height, tolerances)
     beside = Near.find(shown.xy[chosen], kept.lines)
@@ -146,14 +132,13 @@ def _are_rails(
     """Return which cells of narrow pieces belong to rails, (n,) bool: those of a track, and some others.
 
     Rails without a partner are as narrow as a head and no narrower, stand as high as a rail does that is not buried in
-    ballast, or as those that have a partner, their bed is not steeper than a track's, the ground beside is lower,
-    they are not guard rails, they overhang, which thin squares do not show, and the other rail may be hidden. `beside`
+    ballast, or as those that have a partner, on a bed that is not steep, and above the ground on either side. They are
+    not guard rails, they overhang, which thin squares do not show, and the other rail may be hidden. `beside`
     has the points in the height of the heads, and the cells near them.
     """
     partnered = with_partner(kept.pairs, kept.paired)
     piece = pieces_of(len(kept.cell), kept.pairs)
     others = _are_guards(kept, shown.tops.z.ravel()[kept.cell], settings, tolerances.partner_m)
-    others |= _are_beyond(kept, piece, partnered & ~others, settings, tolerances.partner_m)
     partnered &= ~others
     if partnered.all():
         return partnered
@@ -165,34 +150,15 @@ def _are_rails(
     if len(rails):
         off_m = np.abs(height_m - np.median(rails))
         high = np.where(height_m > UNDER_FOOT_M, off_m < tolerances.partner_m, high | (off_m < AS_HIGH_M))
-    slope = np.hypot(*shown.bed.gradients(kept.lines.axis).T)
-    alone = narrow & high & (mean_of(slope, piece) <= SINGLE_SLOPE)
-    alone &= slopes_beside(kept.lines, piece, kept.cell, shown.tops) <= SINGLE_FALL
-    free = partnered.copy()
-    free[~partnered] = are_free(kept.of(~partnered), shown.tops, SINGLE_DEPTH * kept.lines.height[~partnered])
-    alone &= mean_of(free, piece) > MAJORITY
+    slope, z = np.hypot(*shown.bed.gradients(kept.lines.axis).T), shown.tops.z.ravel()[kept.cell]
+    alone = narrow & high & (mean_of(slope, piece) <= STEEP)
+    alone &= above_sides(shown.xy, shown.z, replace(kept.lines, height=z), piece) >= SINGLE_RISE_M
     mine = alone[piece] & ~partnered
     lines, (numbers, number) = kept.lines.of(mine), np.unique(piece[mine], return_inverse=True)
     alone[numbers] = may_hide_partner(lines, number, kept.cell[mine], shown.tops, settings, tolerances.partner_m)
     if not thin:  # wide beams blend a face with what is below it
         alone[numbers] &= ~are_solid(lines, number, shown.xy, shown.height, settings.head_width_m)
     return partnered | (alone[piece] & ~others)
-
-
-def _are_beyond(
-    kept: Kept, piece: np.ndarray, partnered: np.ndarray, settings: Settings, height_m: float
-) -> np.ndarray:
-    """Return which cells are at gauge from a rail of a track, beyond it, and not as high as the rails, (n,) bool.
-
-    Of three lines at gauge, the middle one has a partner on either side: two are a track, and a third one that is not
-    as high is a kerb or an edge. `height_m` is the largest difference of partners.
-    """
-    unrivalled = have_partners(kept.lines, settings.spacings_m, height_m, -SPACING_M)
-    certain = partnered & with_partner(kept.pairs, unrivalled)
-    if not certain.any():
-        return certain
-    off_m = np.abs(mean_of(kept.lines.height, piece) - np.median(kept.lines.height[certain]))
-    return partnered & ~certain & (off_m > AS_HIGH_M)[piece]
 
 
 def _are_guards(kept: Kept, z: np.ndarray, settings: Settings, height_m: float) -> np.ndarray:
@@ -204,7 +170,7 @@ def _are_guards(kept: Kept, z: np.ndarray, settings: Settings, height_m: float) 
     `height_m` is the largest difference of partners.
     """
     lines = kept.lines
-    pairs = kept.pairs[~cross_over(lines)[kept.pairs].any(axis=1)]
+    pairs = kept.pairs
     piece = pieces_of(len(kept.cell), pairs)
     length_m = np.where(with_partner(pairs, kept.paired), np.inf, lengths(lines.axis, piece)[piece])
 

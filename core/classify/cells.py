@@ -12,12 +12,9 @@ from .labels import Near
 from .lines import SINGLE_COVER, Ground, Lines, Marks, centred, find_lines, joined
 from .partner import are_within_gauge, have_partners, runs_inside
 from .pieces import (
-    LEAST_SINGLE_M,
-    lengths,
     links,
     long_enough,
     lower_than_beside,
-    pieces_of,
     shares_of_length,
     stands_free,
 )
@@ -40,6 +37,11 @@ DENSITY_QUANTILE = 0.75
 CANT = 0.12
 """Steepest slope of a track across, height per length: 180 mm over 1.5 m."""
 
+STEEP = 0.3
+"""Steepest bed of a rail: the cant, and as much again for a plane of the bed that is laid through cells of a shoulder.
+Measured: 0.22 at most, and 0.36 and more between the edges of a bank that are at gauge from each other (world 14682),
+and at crests whose far side is hidden."""
+
 NOISE_ACROSS_M = 0.01
 """Largest distance beyond the side of a head at which the top of a cell counts towards its axis. With half the gap to
 a guard rail, the axis would lie between both rails."""
@@ -51,17 +53,21 @@ of its bed, half of the stones beside it are less than 5 cm below its top."""
 
 @dataclass(frozen=True)
 class Shown:
-    """What a square shows near its bed: places, (n, 2), of points, their cells and heights above the bed, (n,)."""
+    """What a square shows near its bed: places, (n, 2), of points, and their cells, heights and heights above the bed.
+
+    `z`, (n,), are metres from any level, the same for all.
+    """
 
     xy: np.ndarray
     cell: np.ndarray
+    z: np.ndarray
     height: np.ndarray
     bed: Bed
     tops: Tops
 
     def of(self, chosen: np.ndarray) -> Shown:
         """Choose some of the points, (n,) bool; the tops stay."""
-        return replace(self, xy=self.xy[chosen], cell=self.cell[chosen], height=self.height[chosen])
+        return replace(self, xy=self.xy[chosen], cell=self.cell[chosen], z=self.z[chosen], height=self.height[chosen])
 
     def mean_heights(self) -> np.ndarray:
         """Mean height of the points of each cell up to `TOP_M` above the bed, (rows, columns); NaN without any."""
@@ -174,22 +180,6 @@ def on_lines(found: Candidates, reach_m: float, tolerances: Tolerances, settings
     good = lines.good()
     lines = _on_middles(lines.of(good), found, tolerances, settings)
     return Kept(lines, found.marks[good], np.zeros(len(good), dtype=bool), links(lines))
-
-
-def fitted_again(kept: Kept, heads: np.ndarray, found: Candidates, tolerances: Tolerances, settings: Settings) -> Kept:
-    """Fit the lines of kept cells to those of heads, (k,) in order, alone: what was dropped led them aside.
-
-    Only those of long pieces are: a row of cells along the edge of a sleeper would look like a bar. What all cells
-    showed of their cover and purity stays: with fewer cells, both would mean something else.
-    """
-    piece = pieces_of(len(kept.cell), kept.pairs)
-    long = (lengths(kept.lines.axis, piece) >= LEAST_SINGLE_M)[piece]
-    wanted, reach_m = np.searchsorted(heads, kept.cell[long]), kept.lines.reach_m
-    again = find_lines(found.at(heads), reach_m, tolerances.along_m, tolerances.beside_line_m, wanted).of(wanted)
-    again = _on_middles(again, found, tolerances, settings)
-    axis, theta = kept.lines.axis.copy(), kept.lines.theta.copy()
-    axis[long], theta[long] = again.axis, again.theta
-    return replace(kept, lines=replace(kept.lines, axis=axis, theta=theta))
 
 
 def _on_middles(lines: Lines, found: Candidates, tolerances: Tolerances, settings: Settings) -> Lines:

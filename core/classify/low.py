@@ -14,7 +14,7 @@ from scipy.ndimage import uniform_filter
 
 from .bed import Bed
 from .cells import (
-    CANT,
+    STEEP,
     Candidates,
     Shown,
     Standing,
@@ -83,11 +83,6 @@ and vehicles on it would lift its cross-section."""
 
 RISE_M = 0.006
 """Least rise of a line: pavements wear to as much, and heads of less are in a pavement themselves."""
-
-STEEP = 2 * CANT
-"""Steepest bed between the rails of a track, across: the cant, and as much for a plane of the bed that is laid through
-cells of a shoulder. Between the edges of a bank that are at gauge from each other, it was 0.36 to 0.43 (world 14682).
-"""
 
 
 @dataclass(frozen=True)

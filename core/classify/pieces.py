@@ -7,20 +7,11 @@ from scipy.sparse import coo_matrix, csr_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from .lines import Lines, turns
+from .lines import Lines
 from .tops import HIGH_M, Tops
 
 ALIGNED_M = 0.03
 """Two cells continue each other if the axis of each passes the other one this close."""
-
-OVER_M, OVER_LEFT_M = (1.0, 2.0), 0.10
-"""Distances ahead and behind at which the direction of a line is compared with that of what it comes from and leads to,
-and how far across that is at most: the distance of a rail and its guard rail."""
-
-OVER_RAD, OVER_SHARE = 0.04, 0.75
-"""Angle to most of the cells there, and their share, from which a line crosses over: from a rail to the guard rail
-beside it, 0.11 m in 1 to 2 m. An arc of 25 m, the sharpest of a tram, turns by as much, but not to the same side at
-both ends."""
 
 HEAD_M = 0.17
 """Distance within which a higher cell shows that a lower one is not a head: half a foot, the fastening beyond it, and
@@ -49,9 +40,9 @@ ACROSS_M = (0.09, 0.13, 0.17, 0.21, 0.25, 0.29)
 ALONG = 9
 """Places along the line, over half its reach to either side."""
 
-SHOWN_SHARE = 0.25
+SHOWN_SHARE = 0.2
 """Least share of the places of one side that are seen, by those of the other side at the same distance, from which they
-count: beams that meet the edge of a head and what is behind it show up to a tenth as many points in its shadow."""
+count: beams that meet the edge of a head and what is behind it show up to a fifth as many points in its shadow."""
 
 MAX_HIGH = 4
 """Of these distances, as many may be as high as the line on one side. A guard rail takes three; the edge of a kerb, of
@@ -69,18 +60,6 @@ def links(lines: Lines, within_m: float | None = None) -> np.ndarray:
     for end in (one, other):
         on &= np.abs(np.einsum("ij,ij->i", step, lines.across[end])) < ALIGNED_M
     return pairs[on]
-
-
-def cross_over(lines: Lines) -> np.ndarray:
-    """Return which cells are on a line from one rail to another beside it, (n,) bool: no rail bends to and fro so."""
-    count = len(lines.axis)
-    own, other, ahead, left = _around(lines, OVER_M[1])
-    near = (np.abs(ahead) > OVER_M[0]) & (np.abs(left) < OVER_LEFT_M)
-    turn = turns(lines.theta[own], lines.theta[other])
-    end = (2 * own + (ahead > 0))[near]
-    turned = np.bincount(end, (np.sign(turn) * (np.abs(turn) > OVER_RAD))[near], 2 * count)
-    share = (turned / np.maximum(np.bincount(end, minlength=2 * count), 1)).reshape(count, 2)
-    return np.any([(sense * share >= OVER_SHARE).all(axis=1) for sense in (-1, 1)], axis=0)
 
 
 def _around(lines: Lines, within_m: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:

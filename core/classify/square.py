@@ -21,7 +21,7 @@ from .tops import HIGH_M, LOW_M, Grid, tops_of
 THIN_PER_M2 = 400.0
 """Points per square metre below which a square is thin: no scanner on a vehicle, or far from it."""
 
-VAULT_M, VAULT_SHARE = 0.25, 0.2
+VAULT_M, VAULT_SHARE = 0.25, 0.05
 """Height above the bed that no rail on plates reaches, and share of the points of a level above another one, in a
 coarse cell, that are higher, from which it carries no rails: a vault, which no plane fits, has half of them there. What
 is seen of a viaduct at a grazing angle may be rails alone, but these are lower."""
@@ -67,7 +67,7 @@ def classify_square(xyz: np.ndarray, settings: Settings) -> ByShape:
     tops = tops_of(grid, cell, height, z[near])
     near_bed = NearBed(xy, z[near], height, bed.coarse.cell[near], level[near])
     paved = NO_FLUSH if settings.blunt else flush_rails(bed.coarse.shape, near_bed, grid, cell, settings)
-    standing = _standing(Shown(xy, cell, height, bed, tops), level[near], paved, settings)
+    standing = _standing(Shown(xy, cell, z[near], height, bed, tops), level[near], paved, settings)
     in_pavement = rail.copy()
     in_pavement[near[paved.points]] = True
     found = np.append(near[standing.points], near[paved.points])

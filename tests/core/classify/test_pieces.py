@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from rail_extract.core.classify.lines import Lines, joined
-from rail_extract.core.classify.pieces import cross_over, links, long_enough, lower_than_beside, to_one_side
+from rail_extract.core.classify.pieces import links, long_enough, lower_than_beside, to_one_side
 
 
 def line(*parts):
@@ -30,24 +30,6 @@ def along_course(course):
     ones, left = np.ones(len(along)), course(along)
     theta = np.arctan(np.gradient(left, along)) % np.pi
     return Lines(np.column_stack([along, left]), 0.15 * ones, theta, ones, ones, 1.0)
-
-
-def test_a_line_that_goes_from_a_rail_to_its_guard_rail_crosses_over():
-    lines = along_course(lambda t: np.clip(0.09 * (t - 10.0), 0.0, 0.115))
-    found = lines.axis[cross_over(lines), 0]
-    assert len(found) >= 10
-    assert 9.9 < found.min() < found.max() < 11.4
-
-
-@pytest.mark.parametrize("to_straight_m", [0.0, 10.0])
-def test_the_sharpest_arc_does_not_cross_over(to_straight_m):
-    lines = along_course(lambda t: np.clip(t - to_straight_m, 0.0, None) ** 2 / 50.0)
-    assert not cross_over(lines).any()
-
-
-def test_a_rail_that_crosses_another_one_does_not_cross_over():
-    one, other = along_course(lambda t: 0.09 * (t - 10.0)), along_course(lambda t: 0.0 * t)
-    assert not cross_over(joined(one, other)).any()
 
 
 @pytest.mark.parametrize(("apart_m", "lower"), [(0.11, True), (0.16, True), (0.24, False)])

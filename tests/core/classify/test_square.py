@@ -286,32 +286,6 @@ def test_of_two_lone_bars_within_a_gauge_the_shorter_one_is_a_guard_rail():
     assert not found[guard].any()
 
 
-def test_a_guard_rail_does_not_continue_the_rail_that_it_hides():
-    """World 12913: cells at its end were on a line from the rail to it, which made both one piece with a partner."""
-    rng = np.random.RandomState(23)
-    xyz, rails = with_track(flat(16.0, rng=rng, per_m2=4000), GAUGE, WIDTH)
-    along, across = turned(xyz, 0.0)
-    place_m = SPACING / 2 - WIDTH - 0.045
-    xyz, guard = with_bar(xyz, WIDTH, 0.0, place_m, TOP_M + 0.01, length_m=8.0, middle_m=4.0)
-    shown = (across < place_m + WIDTH / 2) | ((along < 0.0) & (across < SPACING / 2 + WIDTH / 2))
-    xyz, rails, guard = rough(xyz, rng)[shown], rails[shown], guard[shown]
-    found = classify_square(xyz, SETTINGS).rail
-    far, near = (rails & (side * across[shown] > 0) & inner(xyz, 15) for side in (-1, 1))
-    assert found[far].mean() > 0.95
-    assert found[near & (along[shown] < -1.0)].mean() > 0.95
-    assert found[guard & (along[shown] > 1.0)].mean() < 0.01
-
-
-@pytest.mark.parametrize(("height_m", "kept"), [(TOP_M + 0.01, True), (TOP_M + 0.06, False)])
-def test_what_is_at_gauge_from_a_track_and_not_as_high_is_no_rail(height_m, kept):
-    """The kerb of world 12875, whose distance from the next rail is that of its partner."""
-    rng = np.random.RandomState(25)
-    xyz, _ = with_track(flat(12.0, rng=rng, per_m2=2500), GAUGE, WIDTH)
-    xyz, bar = with_bar(xyz, WIDTH, 0.0, 1.5 * SPACING, height_m)
-    found = classify_square(rough(xyz, rng), SETTINGS).rail
-    assert found[bar & inner(xyz, 10)].mean() > 0.9 if kept else not found[bar].any()
-
-
 @pytest.mark.parametrize(("height_m", "kept"), [(0.17, False), (0.25, True)])
 def test_ground_below_the_place_of_the_other_rail_shows_no_rail_only_where_its_foot_would_hide_it(height_m, kept):
     rng = np.random.RandomState(21)
