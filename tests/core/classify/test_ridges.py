@@ -127,9 +127,9 @@ def section(height_at, seen_at=lambda left_m: np.ones(len(left_m))):
     return xy, height_at(xy[:, 1]), lines_beside(np.zeros(100)), np.zeros(100, dtype=np.int64)
 
 
-@pytest.mark.parametrize(("mixed", "known"), [(0.05, False), (0.3, True)])
+@pytest.mark.parametrize(("mixed", "known"), [(0.05, False), (0.15, False), (0.3, True)])
 def test_a_head_is_no_wider_for_what_is_seen_in_its_shadow(mixed, known):
-    """Beams that meet its edge and the bed behind it are between both in height (world 13587)."""
+    """Beams that meet its edge and the bed behind it are between both in height (worlds 13587 and 14909)."""
     shadow = (0.036, 0.15)
 
     def height_at(left_m):

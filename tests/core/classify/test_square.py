@@ -53,6 +53,17 @@ def test_a_vault_covers_no_rail(slope):
     assert found[len(xyz) :].mean() < 0.005
 
 
+@pytest.mark.parametrize("slope", [0.7, 0.75, 0.8, 0.85])
+def test_a_vault_that_planes_only_just_cease_to_follow_covers_no_rail(slope):
+    """In world 14900, a tenth of each of its cells was higher than any rail."""
+    rng = np.random.RandomState(4)
+    xyz, on = ballasted(rng)
+    vault = xyz[rng.random_sample(len(xyz)) < 0.5]
+    vault[:, 2] = 9.0 + slope * vault[:, 1] + rng.normal(0, 0.005, len(vault))
+    found = classify_square(np.concatenate([xyz, vault]), SETTINGS).rail
+    assert found[: len(xyz)][on & inner(xyz, 8)].mean() > 0.95
+
+
 def test_rails_are_labelled_where_next_to_nothing_of_the_ground_is_seen():
     """At grazing angles a scanner sees one face of each rail, and shadow behind it."""
     xyz, on = at_grazing_angle(np.random.RandomState(3), 0.004)
