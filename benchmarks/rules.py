@@ -93,6 +93,7 @@ SWITCHES = (
     _rule("classify.cells.centred", first),
     _rule("classify.bars._completed", lambda found, kept, *_: np.sort(kept.cell)),
     _rule("classify.cells.are_certain", all_paired, ("classify.bars", "are_certain", all_paired)),
+    _rule("classify.labels._highest_around", lambda image, cells, reach: np.full(len(cells), -(10**6))),
     _rule("classify.labels.UNDER_MEAN_M", 10.0),
     _rule("classify.square.flush_rails", lambda *_: NO_FLUSH),
     _rule("classify.bars.SINGLE_HEIGHT_M", 0.0),

@@ -37,7 +37,7 @@ def on_ridges(kept: Kept, thin: bool, shown: Shown, settings: Settings) -> Stand
     kept = kept.of(with_partner(kept.pairs, kept.paired))
     if len(kept.cell):
         piece = pieces_of(len(kept.cell), kept.pairs)
-        ridges = Ridges.measure(shown.xy, shown.height, kept.lines, piece)
+        ridges = Ridges.measure(shown.xy, shown.height, kept.lines, piece, share=0.0)  # nothing is in shadow here
         blur_m = ridges.blur_m
         one = ridges.may_be_heads(settings.head_width_m)
         of_one = kept.cell[one[piece]]

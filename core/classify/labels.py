@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 from .lines import Lines
 from .pieces import HIDDEN_M, to_one_side
 from .settings import Tolerances
-from .tops import MILLIMETRES, Grid, Tops, Window
+from .tops import EMPTY, MILLIMETRES, Grid, Tops, Window
 
 HEAD_M = 0.11
 """Distance within which a higher kept cell shows that a lower one is the foot of the rail or a fastening."""
@@ -41,7 +41,7 @@ now one face is seen and now the other, and the axis follows. Measured by tripod
 
 
 def whole_heads(tops: Tops, kept: np.ndarray, tolerances: Tolerances) -> np.ndarray:
-    """Spread kept cells, one of each block of 2 x 2, over the others of their blocks that are as high.
+    """Spread kept cells, one of each block of 2 x 2, over the others of their blocks, and drop feet and fastenings.
 
     Returns the cells in rising order, (m,).
     """
@@ -58,7 +58,23 @@ def whole_heads(tops: Tops, kept: np.ndarray, tolerances: Tolerances) -> np.ndar
             r, c = np.clip(first_row + down, 0, rows - 1), np.clip(first_column + right, 0, columns - 1)
             near = np.abs(top[r, c] - own) <= spread
             image[r[near], c[near]] = True
-    return np.flatnonzero(image)
+    cells = np.flatnonzero(image)
+    highest = _highest_around(np.where(image, top, int(EMPTY)), cells, HEAD_M / tops.grid.cell_m)
+    return cells[tops.top.ravel()[cells] >= highest - spread]
+
+
+def _highest_around(image: np.ndarray, cells: np.ndarray, reach: float) -> np.ndarray:
+    """Highest value of an image within `reach` cells of each cell, (k,)."""
+    rows, columns = image.shape
+    row, column = np.divmod(cells, columns)
+    highest = image.ravel()[cells]
+    whole = int(reach)
+    for down in range(-whole, whole + 1):
+        for right in range(-whole, whole + 1):
+            if down * down + right * right <= reach * reach:
+                r, c = np.clip(row + down, 0, rows - 1), np.clip(column + right, 0, columns - 1)
+                highest = np.maximum(highest, image[r, c])
+    return highest
 
 
 def label(tops: Tops, heads: np.ndarray, cell: np.ndarray, height: np.ndarray, tolerances: Tolerances) -> np.ndarray:

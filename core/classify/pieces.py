@@ -40,7 +40,7 @@ ACROSS_M = (0.09, 0.13, 0.17, 0.21, 0.25, 0.29)
 ALONG = 9
 """Places along the line, over half its reach to either side."""
 
-SHOWN_SHARE = 0.2
+SHOWN_SHARE = 0.25
 """Least share of the places of one side that are seen, by those of the other side at the same distance, from which they
 count: beams that meet the edge of a head and what is behind it show up to a fifth as many points in its shadow."""
 

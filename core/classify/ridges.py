@@ -108,9 +108,14 @@ class Ridges:
     length_m: np.ndarray
 
     @classmethod
-    def measure(cls, xy: np.ndarray, height: np.ndarray, lines: Lines, piece: np.ndarray) -> Ridges:
-        """Measure ridges, given points by place and height above the bed, and the piece of each line's cell."""
-        sections = _shown(*_profiles(xy, height, lines, to_one_side(lines, piece), piece), SHOWN_SHARE)
+    def measure(
+        cls, xy: np.ndarray, height: np.ndarray, lines: Lines, piece: np.ndarray, share: float = SHOWN_SHARE
+    ) -> Ridges:
+        """Measure ridges, given points by place and height above the bed, and the piece of each line's cell.
+
+        Bins show nothing with less than this `share` of the points of the other side.
+        """
+        sections = _shown(*_profiles(xy, height, lines, to_one_side(lines, piece), piece), share)
         middle = BINS // 2
         sides = sections[:, middle:], sections[:, middle - 1 :: -1]
         with np.errstate(invalid="ignore"):
