@@ -19,6 +19,11 @@ WIDER_M = 0.03
 quarter of the way down than its partner. Up to 20 mm more, crests are 8 mm off the axis (median in four worlds from
 images), from 40 mm on 38 to 55 mm."""
 
+SHOWN_SHARE = 0.1
+"""Least share of the points of the other side from which a bin of a ridge counts. Images show fewer points on some
+ridges by chance, and none in shadow; but a sharp cloud that is searched in this way must not show its shadows as the
+sides of ridges (world 14957)."""
+
 AVERAGED_M = 1.0
 """Length to either side over which this is averaged: that of single cells scatters by 12 mm."""
 
@@ -37,7 +42,7 @@ def on_ridges(kept: Kept, thin: bool, shown: Shown, settings: Settings) -> Stand
     kept = kept.of(with_partner(kept.pairs, kept.paired))
     if len(kept.cell):
         piece = pieces_of(len(kept.cell), kept.pairs)
-        ridges = Ridges.measure(shown.xy, shown.height, kept.lines, piece, share=0.0)  # nothing is in shadow here
+        ridges = Ridges.measure(shown.xy, shown.height, kept.lines, piece, SHOWN_SHARE)
         blur_m = ridges.blur_m
         one = ridges.may_be_heads(settings.head_width_m)
         of_one = kept.cell[one[piece]]
