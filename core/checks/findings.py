@@ -124,8 +124,8 @@ class Findings:
     """The findings on all tracks, and on what the stations of tracks do not show.
 
     `lonely` rails belong to no track, and `rails_m` is the length of all rails. Tracks with `early_ends` may be right:
-    they are places to look at, and nothing is in doubt for them. `heads` has the width of the heads only
-    if another one is stated. `stepped_m` is the plan length of the tracks that step to the side: on one side of a step,
+    they are places to look at, and nothing is in doubt for them. `heads` has the width of the heads only if another one
+    is stated. `stepped_m` is the plan length of the tracks that step to the side: on one side of a step,
     all of it is off.
     """
 
@@ -250,7 +250,7 @@ class Finding:
     track_id, rail_id : int or None
         Track, or lone rail.
     from_m, to_m : float
-        Chainages along the track or the lone rail; NaN for a section between tracks.
+        Chainages along the track or the lone rail; NaN for a section between tracks or beyond one.
     worst_m : float
         Chainage of the largest possible error.
     gauge_mm, cant_mm, sigma_mm, sigmaz_mm : float

@@ -23,7 +23,7 @@ from .cells import (
 from .labels import Near, label, whole_heads
 from .lines import Marks
 from .partner import MAJORITY, SPACING_M, partner_sides, rise_above, runs_inside
-from .pieces import LEAST_SINGLE_M, lengths, mean_of, pieces_of, with_partner
+from .pieces import LEAST_SINGLE_M, SHOWN_SHARE, lengths, mean_of, pieces_of, with_partner
 from .ridges import Ridges, above_sides
 from .settings import Settings, Tolerances
 from .tops import LOW_M
@@ -120,7 +120,7 @@ def _by_shape(
     sharp = partnered & (width_m < settings.head_width_m + SHARP_WIDER_M)[piece]
     rounded = unsure = partnered & ~sharp
     if rounded.any():
-        spread_m = Ridges.measure(shown.xy, shown.height, kept.lines, piece).spread_m
+        spread_m = Ridges.measure(shown.xy, shown.height, kept.lines, piece, SHOWN_SHARE).spread_m
         rounded = rounded & (spread_m > settings.head_width_m / 2)[piece]
         unsure = unsure & narrow & (spread_m <= settings.head_width_m / 2)[piece]
     return sharp, rounded, unsure
@@ -138,7 +138,8 @@ def _are_rails(
     """
     partnered = with_partner(kept.pairs, kept.paired)
     piece = pieces_of(len(kept.cell), kept.pairs)
-    others = _are_guards(kept, shown.tops.z.ravel()[kept.cell], settings, tolerances.partner_m)
+    z = shown.tops.z.ravel()[kept.cell]
+    others = _are_guards(kept, z, settings, tolerances.partner_m)
     partnered &= ~others
     if partnered.all():
         return partnered
@@ -150,7 +151,7 @@ def _are_rails(
     if len(rails):
         off_m = np.abs(height_m - np.median(rails))
         high = np.where(height_m > UNDER_FOOT_M, off_m < tolerances.partner_m, high | (off_m < AS_HIGH_M))
-    slope, z = np.hypot(*shown.bed.gradients(kept.lines.axis).T), shown.tops.z.ravel()[kept.cell]
+    slope = np.hypot(*shown.bed.gradients(kept.lines.axis).T)
     alone = narrow & high & (mean_of(slope, piece) <= STEEP)
     alone &= above_sides(shown.xy, shown.z, replace(kept.lines, height=z), piece) >= SINGLE_RISE_M
     mine = alone[piece] & ~partnered

@@ -28,7 +28,7 @@ from .cells import (
 from .labels import Near, label
 from .lines import Lines, reach_at
 from .partner import partner_sides
-from .pieces import mean_of, pieces_of, with_partner
+from .pieces import SHOWN_SHARE, mean_of, pieces_of, with_partner
 from .ridges import Ridges, above_sides, cells_beside, on_crests
 from .settings import Settings, Tolerances
 from .tops import EMPTY, MILLIMETRES, WINDOW_M, Grid
@@ -116,7 +116,7 @@ def on_low(shown: Shown, settings: Settings) -> Standing:
         piece = pieces_of(len(kept.cell), kept.pairs)
         low_enough = shown.height < HIGHEST_M
         of_heads = shown.of(low_enough)
-        width_m = Ridges.measure(of_heads.xy, of_heads.height, kept.lines, piece).width_m
+        width_m = Ridges.measure(of_heads.xy, of_heads.height, kept.lines, piece, SHOWN_SHARE).width_m
         heads = ~(width_m >= settings.head_width_m + tolerances.wider_m)  # where one side is hidden, this is not known
         heads &= above_sides(of_heads.xy, above_bed[low_enough], kept.lines, piece) >= RISE_M
         heads &= _slopes_to_partners(kept.lines, piece, shown.bed, settings, tolerances) <= STEEP

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from .lines import Lines
-from .pieces import SHOWN_SHARE, lengths, linked, links, pieces_of, to_one_side
+from .pieces import lengths, linked, links, pieces_of, to_one_side
 from .tops import MILLIMETRES, Grid
 
 REACH_M = 0.30
@@ -108,9 +108,7 @@ class Ridges:
     length_m: np.ndarray
 
     @classmethod
-    def measure(
-        cls, xy: np.ndarray, height: np.ndarray, lines: Lines, piece: np.ndarray, share: float = SHOWN_SHARE
-    ) -> Ridges:
+    def measure(cls, xy: np.ndarray, height: np.ndarray, lines: Lines, piece: np.ndarray, share: float) -> Ridges:
         """Measure ridges, given points by place and height above the bed, and the piece of each line's cell.
 
         Bins show nothing with less than this `share` of the points of the other side.

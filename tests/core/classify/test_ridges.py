@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from rail_extract.core.classify.lines import Lines
+from rail_extract.core.classify.pieces import SHOWN_SHARE
 from rail_extract.core.classify.ridges import Ridges, above_sides, on_crests, steadied
 from rail_extract.core.classify.settings import Settings, Way
 from rail_extract.core.classify.square import classify_square
@@ -138,7 +139,7 @@ def test_a_head_is_no_wider_for_what_is_seen_in_its_shadow(mixed, known):
     def seen_at(left_m):
         return np.where((left_m > shadow[0]) & (left_m < shadow[1]), mixed, 1.0)
 
-    width_m = Ridges.measure(*section(height_at, seen_at)).width_m[0]
+    width_m = Ridges.measure(*section(height_at, seen_at), SHOWN_SHARE).width_m[0]
     assert width_m == pytest.approx(0.036 + shadow[1], abs=0.01) if known else np.isnan(width_m)
 
 
