@@ -9,7 +9,7 @@ from __future__ import annotations
 import inspect
 import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Union
 
@@ -82,7 +82,7 @@ class Variant:
     """One way in which every scene is run: a model, an engine, and the scenes that are run so.
 
     `seed_shift` is added to the seed of every scene; it is even, because odd seeds look from the other side in some.
-    Every installation has OpenCV.
+    Every installation has OpenCV. `tolerances` replace those of the table.
     """
 
     name: str
@@ -90,11 +90,17 @@ class Variant:
     seed_shift: int = 0
     engine: str = "OPENCV"
     places: tuple[str, ...] = PLACES
+    tolerances: Mapping[str, float] = field(default_factory=dict, hash=False)
 
 
 PLAIN = Variant("as published")
-TORCH = Variant("PyTorch", engine="TORCH", places=("throat",))
-"""Engines round differently, and the cells of this scene differ by enough to draw other lines."""
+TORCH = Variant("PyTorch", engine="TORCH", places=("throat",), tolerances={"bridged m": 0.7})
+"""Engines round differently, and the cells of this scene differ by enough to draw other lines.
+
+bfloat16 rounds differently with the instructions that a processor has: 41.1 m of the 20 rails are bridged in float32,
+on every processor, and 41.6, 41.8, 42.0 and 42.3 m in bfloat16 with four sets of instructions. All other figures stay
+within the table's tolerances.
+"""
 
 VARIANTS = (
     PLAIN,
@@ -246,7 +252,9 @@ class Golden:
 
     def differences(self, variant: Variant, place: str, now: Mapping[str, float]) -> list[Difference]:
         """Compare the figures of a scene with the table."""
-        return differences(place, self.figures.get(variant.name, {}).get(place, {}), now, self.tolerances)
+        return differences(
+            place, self.figures.get(variant.name, {}).get(place, {}), now, {**self.tolerances, **variant.tolerances}
+        )
 
     def put(self, variant: Variant, place: str, now: Mapping[str, float]) -> None:
         """Replace the figures of a scene."""

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rail_extract.laboratory.ruler.golden import PLAIN, QUICK, TORCH, VARIANTS, Golden, build_scene, figures_of
+from rail_extract.laboratory.ruler.golden import PLAIN, QUICK, TORCH, VARIANTS, Golden, Variant, build_scene, figures_of
 
 TABLE = Path(__file__).resolve().parents[2] / "benchmarks" / "golden.json"
 
@@ -41,3 +41,15 @@ def test_figures_that_moved_appeared_or_vanished_differ(tmp_path):
     moved = again.differences(PLAIN, "straight", {"across mm": 1.25, "tracks": np.nan, "fork m": 0.1})
     assert [difference.figure for difference in moved] == ["across mm", "tracks", "fork m"]
     assert str(moved[0]).split() == ["straight", "across", "mm", "1.00", "->", "1.25"]
+
+
+def test_a_variant_may_have_tolerances_of_its_own(tmp_path):
+    path = tmp_path / "golden.json"
+    path.write_text(json.dumps({"tolerances": {"across mm": 0.2, "bridged m": 0.3}, "figures": {}}), "utf-8")
+    golden = Golden(path)
+    rough = Variant("rough", tolerances={"bridged m": 0.7})
+    for variant in (PLAIN, rough):
+        golden.put(variant, "straight", {"across mm": 1.0, "bridged m": 41.0})
+    now = {"across mm": 1.3, "bridged m": 41.5}
+    assert [moved.figure for moved in golden.differences(PLAIN, "straight", now)] == ["across mm", "bridged m"]
+    assert [moved.figure for moved in golden.differences(rough, "straight", now)] == ["across mm"]
