@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 
 from .lines import Lines
 from .pieces import lengths, linked, links, pieces_of, to_one_side
-from .tops import MILLIMETRES, Grid
+from .tops import HIGH_M, MILLIMETRES, Grid
 
 REACH_M = 0.30
 """Half the width of a cross-section: a head that is blurred by 8 cm, and the bed beside it."""
@@ -170,8 +170,9 @@ def above_sides(xy: np.ndarray, height: np.ndarray, lines: Lines, piece: np.ndar
 
     Points are given by place and height above the bed. The edge of a slab or a shoulder is a crest as well, but the
     ground on one side leads up to it. A side that is not seen does not count; without a crest, the height is NaN.
+    What is higher than `HIGH_M` above a ridge is a train, a roof or a bridge, and not its ground.
     """
-    count, rise = _profiles(xy, height, lines, to_one_side(lines, piece), piece)
+    count, rise = _profiles(xy, height, lines, to_one_side(lines, piece), piece, HIGH_M)
     lit, every = (_shown(count, rise, share) for share in (LIT_SHARE, 0.0))
     tops = np.flatnonzero(np.abs(MIDDLES_M) < CREST_M)
     with np.errstate(invalid="ignore"):
@@ -287,11 +288,12 @@ def _shown(count: np.ndarray, rise: np.ndarray, share: float) -> np.ndarray:
 
 
 def _profiles(
-    xy: np.ndarray, height: np.ndarray, lines: Lines, across: np.ndarray, piece: np.ndarray
+    xy: np.ndarray, height: np.ndarray, lines: Lines, across: np.ndarray, piece: np.ndarray, up_to_m: float = np.inf
 ) -> tuple[np.ndarray, np.ndarray]:
     """Count the points beside each piece, and sum up their heights relative to its line, (pieces, BINS) each.
 
     Bins are in the direction of the unit vectors `across`, (cells, 2), which are to the same side of what is summed up.
+    Points that are higher above the line than `up_to_m` are left out.
     """
     count, reach_m = int(piece.max()) + 1, float(np.hypot(REACH_M, SLICE_M))
     near = _around(xy, lines.axis, reach_m)
@@ -301,10 +303,11 @@ def _profiles(
     step = xy[near] - lines.axis[cell]
     bins = np.floor(np.einsum("ij,ij->i", step, across[cell]) / BIN_M).astype(np.int64) + BINS // 2
     inside = np.abs(np.einsum("ij,ij->i", step, lines.along[cell])) < SLICE_M
-    inside &= (bins >= 0) & (bins < BINS)
+    up_m = height[near] - lines.height[cell]
+    inside &= (bins >= 0) & (bins < BINS) & (up_m <= up_to_m)
     number = (piece[cell] * BINS + bins)[inside]
     # Whole numbers add up to the same sum in any order of the points.
-    rise = np.round((height[near] - lines.height[cell])[inside] * MILLIMETRES)
+    rise = np.round(up_m[inside] * MILLIMETRES)
     counts = [np.bincount(number, weights, count * BINS).reshape(count, BINS) for weights in (None, rise)]
     return counts[0].astype(float), counts[1] / MILLIMETRES
 

@@ -165,6 +165,16 @@ def test_a_side_that_is_not_seen_does_not_tell_an_edge_from_a_head():
     assert above_sides(xy, height, lines, piece)[0] == pytest.approx(0.05, abs=0.002)
 
 
+def test_a_train_above_the_ground_is_not_the_ground():
+    """Few beams reach the ground in the shadow of a head, and others of the same bins the train beside it (14958)."""
+    xy, height, lines, piece = section(
+        lambda left_m: np.where(np.abs(left_m) < 0.036, 0.2, 0.0), lambda left_m: np.where(left_m > 0.036, 0.05, 1.0)
+    )
+    train = section(lambda left_m: np.full(left_m.shape, 3.5), lambda left_m: np.where(left_m > 0.036, 0.05, 0.0))
+    both = np.concatenate([xy, train[0]]), np.concatenate([height, train[1]])
+    assert above_sides(*both, lines, piece)[0] == pytest.approx(0.2, abs=0.002)
+
+
 def test_axes_that_scatter_are_steadied():
     scattered = np.random.RandomState(5).uniform(-0.035, 0.035, 200)
     across_m = steadied(lines_beside(scattered)).axis[:, 1]
