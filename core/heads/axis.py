@@ -30,6 +30,9 @@ NARROW_SHARE, NARROW_PERCENTILES = 0.25, (5.0, 95.0)
 """Width of a band of points, in head widths and between these percentiles, in which no edges are looked for: points
 that were drawn or computed on the axis, not scanned, all have one offset."""
 
+STRAY_SIGMAS = 3.0
+"""Distance from a band, in standard deviations of its points, from which they are not on it: foot, ballast, weeds."""
+
 CELL_M = 0.04
 """Cell size of the raster of standard gauge."""
 
@@ -135,10 +138,11 @@ def _is_narrow(points: HeadPoints) -> bool:
 
 def _of_band(points: HeadPoints, left_m: float, sigma_m: float) -> Shown:
     """Return what points show that are all on one face, or on the axis; the axis is at `left_m` on average."""
-    stations, across = points.stations, points.across
-    count, mean_m = _means(points)
-    noise_m = robust_sigma(across - band_of(points))
-    offset_m, common_m = mean_m + left_m - np.median(across), np.full(len(stations), sigma_m)
+    stations = points.stations
+    off_m = points.across - band_of(points)
+    noise_m = robust_sigma(off_m)
+    count, mean_m = _means(points[np.abs(off_m) < STRAY_SIGMAS * noise_m])
+    offset_m, common_m = mean_m + left_m - np.median(points.across), np.full(len(stations), sigma_m)
     return Shown(stations, count, offset_m, count / noise_m**2, common_m, Middles.unknown(len(stations)))
 
 

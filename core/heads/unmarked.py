@@ -143,8 +143,8 @@ def _strips_of(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the strip of each point, (n,) from 1, and the number of passes of each strip, (k,).
 
-    It is unknown which pass shows a section alone. A level with twice or three times as many points as another is of as
-    many passes.
+    It is unknown which pass shows a section alone. A level with twice or three times as many points on crowns as
+    another is of as many passes; a face is on all levels.
     """
     strips, best = np.full(count, UNKNOWN), np.zeros(count)
     counts = np.zeros(len(levels.up_m))
@@ -155,7 +155,7 @@ def _strips_of(
         better = (shown.sum() > 1) & (density > best[view.numbers])
         strips[view.numbers[better]] = np.where(own == UNKNOWN, UNKNOWN, own + 1)[better]
         best[view.numbers[better]] = density[better]
-        counts += on_each * shown.all()
+        counts += view.on_crowns(own, apart_m) * shown.all()
     numbers = np.arange(1, MAX_LEVELS)
     ratio = counts / max(counts.min(), 1.0)
     return strips, numbers[np.argmin(np.abs(np.log(numbers / ratio.clip(1.0)[:, None])), axis=1)]
@@ -251,7 +251,8 @@ class _View:
         known = middles_m[np.isfinite(middles_m)]
         self.middle_m = float(known.mean()) if len(known) else 0.0
         self.grid, self.outline = Grid.of(head.width_m), Outline.of(head.width_m)
-        self.bins = self.grid.number(head.across - self.middle_m, above)
+        self.across, self.crown_m = head.across - self.middle_m, AXIS_SHARE * head.width_m
+        self.bins = self.grid.number(self.across, above)
         self.counts = np.bincount(self.bins[self.bins >= 0], minlength=self.grid.size).astype(float)
         self.off_m = 0.0
         parts = len(self.outline.parts) + 1
@@ -289,6 +290,12 @@ class _View:
         )
         inside = self.bins >= 0
         return np.where(inside, own[self.bins], UNKNOWN), np.where(inside, densities.max(axis=0)[self.bins], 0.0)
+
+    def on_crowns(self, own: np.ndarray, apart_m: np.ndarray) -> np.ndarray:
+        """Count the points near the axis of the head of each level, (k,), given the level of each point, (n,)."""
+        axes_m = self.off_m + apart_m @ self.normal
+        near = (own != UNKNOWN) & (np.abs(self.across - axes_m[own]) < self.crown_m)
+        return np.bincount(own[near], minlength=len(axes_m))
 
 
 def _views(head: HeadPoints, course: _Course, levels: _Levels) -> Iterator[_View]:

@@ -71,6 +71,13 @@ def test_lines_are_on_the_mean_of_passes_and_state_that_they_differ(passes):
         assert abs(np.mean(repeated.xyz[10:-10, 2])) < 0.0012
 
 
+def test_faces_do_not_count_for_the_number_of_passes():
+    """A low scanner sees as much of the crowns as a high one, and more of the faces (world 15036)."""
+    points, lines = scanned([(0.006, -0.012, 3.0, 0.5), (-0.006, 0.012, 1.0, 1.0)])
+    apart = told_apart(points, lines, HEAD_M).apart
+    np.testing.assert_allclose(apart, [[0, 0.006, -0.012, 1], [0, -0.006, 0.012, 1]], atol=0.001)
+
+
 def test_one_pass_stays_as_it_is():
     points, lines = scanned([(0.0, 0.0, 3.0, 1.0)])
     assert told_apart(points, lines, HEAD_M) is points
