@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 
 from .lines import Lines
 from .pieces import lengths, linked, links, pieces_of, to_one_side
-from .tops import HIGH_M, MILLIMETRES, Grid
+from .tops import MILLIMETRES, Grid
 
 REACH_M = 0.30
 """Half the width of a cross-section: a head that is blurred by 8 cm, and the bed beside it."""
@@ -170,9 +170,9 @@ def above_sides(xy: np.ndarray, height: np.ndarray, lines: Lines, piece: np.ndar
 
     Points are given by place and height above the bed. The edge of a slab or a shoulder is a crest as well, but the
     ground on one side leads up to it. A side that is not seen does not count; without a crest, the height is NaN.
-    What is higher than `HIGH_M` above a ridge is a train, a roof or a bridge, and not its ground.
+    What is higher above a ridge than ground that rises at 45° is a train, a roof or a bridge.
     """
-    count, rise = _profiles(xy, height, lines, to_one_side(lines, piece), piece, HIGH_M)
+    count, rise = _profiles(xy, height, lines, to_one_side(lines, piece), piece, GROUND_M[1])
     lit, every = (_shown(count, rise, share) for share in (LIT_SHARE, 0.0))
     tops = np.flatnonzero(np.abs(MIDDLES_M) < CREST_M)
     with np.errstate(invalid="ignore"):
