@@ -92,6 +92,7 @@ SWITCHES = (
     _rule("classify.cells.lower_than_beside", none_of),
     _rule("classify.cells.centred", first),
     _rule("classify.bars._completed", lambda found, kept, *_: np.sort(kept.cell)),
+    _rule("classify.bars.opposite_heads", lambda *_: np.empty(0, dtype=np.int64)),
     _rule("classify.cells.are_certain", all_paired, ("classify.bars", "are_certain", all_paired)),
     _rule("classify.labels._highest_around", lambda image, cells, reach: np.full(len(cells), -(10**6))),
     _rule("classify.labels.UNDER_MEAN_M", 10.0),

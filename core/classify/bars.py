@@ -22,6 +22,7 @@ from .cells import (
 )
 from .labels import Near, label, whole_heads
 from .lines import Marks
+from .opposite import opposite_heads
 from .partner import MAJORITY, SPACING_M, partner_sides, rise_above, runs_inside
 from .pieces import LEAST_SINGLE_M, SHOWN_SHARE, lengths, mean_of, pieces_of, with_partner
 from .ridges import Ridges, above_sides
@@ -81,7 +82,10 @@ def on_bars(
     beside = Near.find(shown.xy[chosen], kept.lines)
     rails = _are_rails(kept, thin, beside, shown, settings, tolerances)
     standing = as_wanted(kept, rails, chosen, beside, thin, settings, tolerances)
-    return replace(standing, sharp_m=sharp_m, round_m=round_m, unsure_m=unsure_m, clear_m=clear_m)
+    points = standing.points
+    if not thin:  # from the air, nothing hides a head
+        points = np.union1d(points, opposite_heads(standing.kept, shown, settings, tolerances))
+    return replace(standing, points=points, sharp_m=sharp_m, round_m=round_m, unsure_m=unsure_m, clear_m=clear_m)
 
 
 def _completed(found: Candidates, kept: Kept, settings: Settings, tolerances: Tolerances) -> np.ndarray:

@@ -139,22 +139,22 @@ class Near:
         are everywhere alike, and that of a piece the median over its points.
         """
         inside = np.abs(self.across) < WIDEST_M
-        cell, number = self.cell[inside], _sections(lines, piece)
+        cell, number = self.cell[inside], sections(lines, piece)
         left = np.einsum("ij,ij->i", to_one_side(lines, number), lines.across)
         section, across = number[cell], left[cell] * self.across[inside]
-        low, high = (_quantiles(across, section, share) for share in (BEYOND_SHARE, 1 - BEYOND_SHARE))
+        low, high = (quantiles(across, section, share) for share in (BEYOND_SHARE, 1 - BEYOND_SHARE))
         width_m = (high - low) / (1 - 2 * BEYOND_SHARE)
-        median = _quantiles(width_m[section], piece[cell], 0.5)
+        median = quantiles(width_m[section], piece[cell], 0.5)
         return np.append(median, np.zeros(int(piece.max(initial=-1)) + 1 - len(median)))
 
 
-def _sections(lines: Lines, piece: np.ndarray) -> np.ndarray:
+def sections(lines: Lines, piece: np.ndarray) -> np.ndarray:
     """Return the section of each cell, (n,) numbers: the part of its piece that is in one square metre."""
     place = np.column_stack([piece, np.floor(lines.axis / SECTION_M)])
     return np.unique(place, axis=0, return_inverse=True)[1].ravel()
 
 
-def _quantiles(values: np.ndarray, group: np.ndarray, share: float) -> np.ndarray:
+def quantiles(values: np.ndarray, group: np.ndarray, share: float) -> np.ndarray:
     """Quantile of the values, (n,), of each group, up to the last that has any, (groups,); 0 without any.
 
     Of n values, the k-th has k / (n + 1) of all below it: so few of them do not seem to be closer than many.

@@ -296,7 +296,7 @@ def _profiles(
     Points that are higher above the line than `up_to_m` are left out.
     """
     count, reach_m = int(piece.max()) + 1, float(np.hypot(REACH_M, SLICE_M))
-    near = _around(xy, lines.axis, reach_m)
+    near = points_around(xy, lines.axis, reach_m)
     distance, cell = cKDTree(lines.axis).query(xy[near], distance_upper_bound=reach_m)
     seen = np.isfinite(distance)
     near, cell = near[seen], cell[seen]
@@ -312,7 +312,7 @@ def _profiles(
     return counts[0].astype(float), counts[1] / MILLIMETRES
 
 
-def _around(xy: np.ndarray, places: np.ndarray, reach_m: float) -> np.ndarray:
+def points_around(xy: np.ndarray, places: np.ndarray, reach_m: float) -> np.ndarray:
     """Return the points, (k,) numbers, in cells around places: all within `reach_m` of one, and few others.
 
     This is many times as fast as to ask each point for the nearest place.
