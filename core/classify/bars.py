@@ -84,7 +84,7 @@ def on_bars(
     standing = as_wanted(kept, rails, chosen, beside, thin, settings, tolerances)
     points = standing.points
     if not thin:  # from the air, nothing hides a head
-        points = np.union1d(points, opposite_heads(standing.kept, shown, settings, tolerances))
+        points = np.union1d(points, opposite_heads(standing.kept, shown, settings))
     return replace(standing, points=points, sharp_m=sharp_m, round_m=round_m, unsure_m=unsure_m, clear_m=clear_m)
 
 

@@ -13,10 +13,10 @@ from scipy.spatial import cKDTree
 from .cells import STEEP, Kept, Shown
 from .labels import quantiles, sections
 from .lines import Lines
-from .partner import MAJORITY, partner_sides
+from .partner import MAJORITY
 from .pieces import pieces_of, shares_of_length, to_one_side
 from .ridges import points_around
-from .settings import Settings, Tolerances
+from .settings import Settings
 
 LEVEL_M = 0.06
 """Largest difference in height of the two heads of a track beyond the slope of the bed across: that of the bed beside a
@@ -38,10 +38,10 @@ LEAST_PER_M, LEAST_M = 8.0, 3.0
 piece of a rail that was found by itself."""
 
 
-def opposite_heads(kept: Kept, shown: Shown, settings: Settings, tolerances: Tolerances) -> np.ndarray:
+def opposite_heads(kept: Kept, shown: Shown, settings: Settings) -> np.ndarray:
     """Find the points of heads at gauge from cells of rails without a partner, (k,) numbers in rising order."""
     found = [np.empty(0, dtype=np.int64)]
-    alone = partner_sides(kept.lines, settings.spacings_m, tolerances.partner_m, tolerances.worse_m) == 0
+    alone = ~kept.paired
     if alone.any():
         piece = pieces_of(len(kept.cell), kept.pairs)
         across, z = to_one_side(kept.lines, piece), shown.tops.z.ravel()[kept.cell]

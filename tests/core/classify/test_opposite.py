@@ -38,7 +38,7 @@ def found(other, cant=0.0, rail_m=LENGTH_M):
     axis, one = np.column_stack([x, 0 * x + RAIL_M]), np.ones(len(x))
     lines = Lines(axis, HEIGHT_M * one, 0 * one, one, one, 1.0)
     rail = Kept(lines, grid.cells(axis)[0], one > 1, links(lines))
-    numbers = opposite_heads(rail, shown, SETTINGS, SETTINGS.tolerances(thin=False))
+    numbers = opposite_heads(rail, shown, SETTINGS)
     assert (numbers < len(other)).all()
     return np.isin(np.arange(len(other)), numbers)
 
