@@ -125,8 +125,8 @@ class Findings:
 
     `lonely` rails belong to no track, and `rails_m` is the length of all rails. Tracks with `early_ends` may be right:
     they are places to look at, and nothing is in doubt for them. `heads` has the width of the heads only if another one
-    is stated. `stepped_m` is the plan length of the tracks that step to the side: on one side of a step,
-    all of it is off.
+    is stated. `stepped_m` is the plan length of the tracks that step to the side: on one side of a step, all of it is
+    off.
     """
 
     tracks: tuple[TrackFindings, ...]

@@ -170,7 +170,7 @@ def above_sides(xy: np.ndarray, height: np.ndarray, lines: Lines, piece: np.ndar
 
     Points are given by place and height above the bed. The edge of a slab or a shoulder is a crest as well, but the
     ground on one side leads up to it. A side that is not seen does not count; without a crest, the height is NaN.
-    What is higher above a ridge than ground that rises at 45° is a train, a roof or a bridge.
+    What is higher above a ridge than ground that rises at 45° is a train, a roof or a bridge, and does not count.
     """
     count, rise = _profiles(xy, height, lines, to_one_side(lines, piece), piece, GROUND_M[1])
     lit, every = (_shown(count, rise, share) for share in (LIT_SHARE, 0.0))
@@ -296,10 +296,7 @@ def _profiles(
     Points that are higher above the line than `up_to_m` are left out.
     """
     count, reach_m = int(piece.max()) + 1, float(np.hypot(REACH_M, SLICE_M))
-    near = points_around(xy, lines.axis, reach_m)
-    distance, cell = cKDTree(lines.axis).query(xy[near], distance_upper_bound=reach_m)
-    seen = np.isfinite(distance)
-    near, cell = near[seen], cell[seen]
+    near, cell = nearest(xy, lines.axis, reach_m)
     step = xy[near] - lines.axis[cell]
     bins = np.floor(np.einsum("ij,ij->i", step, across[cell]) / BIN_M).astype(np.int64) + BINS // 2
     inside = np.abs(np.einsum("ij,ij->i", step, lines.along[cell])) < SLICE_M
@@ -312,7 +309,18 @@ def _profiles(
     return counts[0].astype(float), counts[1] / MILLIMETRES
 
 
-def points_around(xy: np.ndarray, places: np.ndarray, reach_m: float) -> np.ndarray:
+def nearest(xy: np.ndarray, places: np.ndarray, reach_m: float) -> tuple[np.ndarray, np.ndarray]:
+    """Find the points within `reach_m` of a place, and the nearest place of each, (k,) numbers each.
+
+    Given are n points, (n, 2), and places, (m, 2).
+    """
+    near = _around(xy, places, reach_m)
+    distance, place = cKDTree(places).query(xy[near], distance_upper_bound=reach_m)
+    seen = np.isfinite(distance)
+    return near[seen], place[seen]
+
+
+def _around(xy: np.ndarray, places: np.ndarray, reach_m: float) -> np.ndarray:
     """Return the points, (k,) numbers, in cells around places: all within `reach_m` of one, and few others.
 
     This is many times as fast as to ask each point for the nearest place.

@@ -97,8 +97,8 @@ PLAIN = Variant("as published")
 TORCH = Variant("PyTorch", engine="TORCH", places=("throat",), tolerances={"bridged m": 0.7})
 """Engines round differently, and the cells of this scene differ by enough to draw other lines.
 
-bfloat16 rounds differently with the instructions that a processor has: 41.1 m of the 20 rails are bridged in float32,
-on every processor, and 41.6, 41.8, 42.0 and 42.3 m in bfloat16 with four sets of instructions. All other figures stay
+bfloat16 rounds differently with the instructions that a processor has: 41.1 m of the 20 rails are bridged in float32
+with each of five sets of instructions, and 41.6, 41.8, 42.0 and 42.3 m in bfloat16 with four. All other figures stay
 within the table's tolerances.
 """
 
