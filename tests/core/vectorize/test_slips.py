@@ -52,6 +52,42 @@ def test_a_slip_is_found_where_no_lines_meet(number, radius_m):
         assert np.abs(off[:, 0] * along[1] - off[:, 1] * along[0]).max() / np.hypot(*along) < 0.02
 
 
+def lines_around_a_slip(number=9.0, radius_m=190.0, hidden_m=5.0):
+    """Lines that meet in the acute frogs and end `hidden_m` from the middle of a slip, and the curves on one side."""
+    half_angle = 0.5 * np.arctan(1 / number)
+    slope = np.tan(half_angle)
+    frog_m = SPACING_M / (2 * slope)
+    frogs = [np.array([side * frog_m, SPACING_M / 2]) for side in (1, -1)]
+    lines, nodes, ends = [], list(frogs), []
+
+    def add(x, y, first, last):
+        lines.append(np.column_stack([x, y]))
+        ends.append([len(nodes) if first is None else first, len(nodes) + (first is None) if last is None else last])
+        nodes.extend(lines[-1][at] for at, node in ((0, first), (-1, last)) if node is None)
+
+    for up_m, rise in ((0.0, slope), (0.0, -slope), (SPACING_M, slope), (SPACING_M, -slope)):
+        for number_of_frog, side in enumerate((1, -1)):
+            inner, outer = (side * np.linspace(*part, 80) for part in ((hidden_m, frog_m), (frog_m, LENGTH_M)))
+            meets = (up_m == 0.0) == (side * rise > 0)
+            add(inner, up_m + rise * inner, None, number_of_frog if meets else len(nodes) + 1)
+            if not meets:
+                nodes.append(lines[-1][-1])
+            add(outer, up_m + rise * outer, ends[-1][1], None)
+        x, above_m = np.linspace(-7.0, 7.0, 140), radius_m * half_angle**2 / 2
+        if rise > 0:
+            add(x, up_m - above_m - (x * half_angle) ** 2 / (4 * above_m), None, None)
+    return LineNetwork(tuple(lines), np.array(nodes), np.array(ends))
+
+
+def test_a_slip_is_found_by_its_acute_frogs_where_its_middle_is_hidden():
+    network = lines_around_a_slip()
+    network, slips = open_slips(network, RailCells(cells_of(network.lines), [SPACING_M]))
+    np.testing.assert_allclose(sorted(slip.cross.place[1] for slip in slips), [0.0, SPACING_M], atol=0.02)
+    assert [len(slip.curves) for slip in slips] == [1, 1]
+    heights = [slip.curves[0].height for slip in slips]
+    np.testing.assert_allclose(heights, 190.0 * (0.5 * np.arctan(1 / 9)) ** 2 / 2, atol=0.03)
+
+
 def test_lines_that_come_close_and_part_again_are_left_as_they_are():
     lines = [line for line in lines_beside_a_slip() if line[0, 1] > line[len(line) // 2, 1]]
     other = [line * [1.0, -1.0] - [0.0, 0.3] for line in lines]
@@ -82,6 +118,17 @@ def test_rails_between_the_legs_of_a_slip_stay():
     network, slips = opened([*lines_beside_a_slip(9.0, 230.0), between])
     assert [slip.clear_m for slip in slips] == [11.0, 11.0]
     assert any(np.array_equal(line, between) for line in network.lines)
+
+
+def test_a_leg_is_taken_from_the_border_of_a_slip_however_far_apart_its_vertices_are():
+    """A line that turns onto the rails of a frog 1.5 m behind its only vertex outside the slip (world 15369)."""
+    first, *others = lines_beside_a_slip()
+    first = first[(first[:, 0] < 7.95) | ((first[:, 0] > 12.0) & (first[:, 0] < 14.0))]
+    first[first[:, 0] > 13.4, 1] -= 0.4
+    network, slips = opened([first, *others], cells_of(lines_beside_a_slip()))
+    assert len(slips) == 2
+    drawn = follow_courses(network, RailCells(cells_of(lines_beside_a_slip()), [SPACING_M]), 5.0, 10.0).lines
+    assert sorted(round(np.ptp(line[:, 0])) for line in drawn) == [LENGTH_M + 14, *[2 * LENGTH_M] * 3]
 
 
 @pytest.mark.parametrize("number", [9.0, 18.0, 24.0])
