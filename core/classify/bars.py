@@ -9,7 +9,6 @@ import numpy as np
 
 from .alone import UNDER_FOOT_M, are_solid, may_hide_partner
 from .cells import (
-    STEEP,
     Candidates,
     Kept,
     Shown,
@@ -23,7 +22,7 @@ from .cells import (
 from .labels import Near, label, whole_heads
 from .lines import Marks
 from .opposite import opposite_heads
-from .partner import MAJORITY, SPACING_M, partner_sides, rise_above, runs_inside
+from .partner import MAJORITY, SPACING_M, STEEP, partner_sides, rise_above, runs_inside
 from .pieces import LEAST_SINGLE_M, SHOWN_SHARE, lengths, mean_of, pieces_of, with_partner
 from .ridges import Ridges, above_sides
 from .settings import Settings, Tolerances

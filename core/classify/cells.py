@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 from .bed import COARSE_M, Bed, Coarse
 from .labels import Near
 from .lines import SINGLE_COVER, Ground, Lines, Marks, centred, find_lines, joined
-from .partner import are_within_gauge, have_partners, runs_inside
+from .partner import are_within_gauge, have_partners, majority, runs_inside
 from .pieces import (
     links,
     long_enough,
@@ -36,11 +36,6 @@ DENSITY_QUANTILE = 0.75
 
 CANT = 0.12
 """Steepest slope of a track across, height per length: 180 mm over 1.5 m."""
-
-STEEP = 0.3
-"""Steepest bed of a rail: the cant, and as much again for a plane of the bed that is laid through cells of a shoulder.
-Measured: 0.22 at most, and 0.36 and more between the edges of a bank that are at gauge from each other (world 14682),
-and at crests whose far side is hidden."""
 
 NOISE_ACROSS_M = 0.01
 """Largest distance beyond the side of a head at which the top of a cell counts towards its axis. With half the gap to
@@ -209,7 +204,8 @@ def free_standing(found: Candidates, bed: Bed, reach_m: float, tolerances: Toler
 def on_rails(kept: Kept, free: np.ndarray, settings: Settings, tolerances: Tolerances) -> Kept:
     """Keep cells that stand free, (n,) bool, unless they belong to guard rails, feet of rails, or short pieces."""
     kept = kept.of(are_certain(kept.lines, kept.paired, kept.pairs) & free)
-    inside = runs_inside(kept.lines, kept.paired, kept.pairs, settings.gauges_m, settings.head_width_m)
+    rails = majority(kept.paired, kept.pairs)  # single cells of a trough have a partner, too
+    inside = runs_inside(kept.lines, rails, kept.pairs, settings.gauges_m, settings.head_width_m)
     kept = kept.of(~inside)
     kept = kept.of(~lower_than_beside(kept.lines, tolerances.spread_m))
     return kept.of(are_long(kept, settings, settings.keep_single, tolerances.least_m))

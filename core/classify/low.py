@@ -14,7 +14,6 @@ from scipy.ndimage import uniform_filter
 
 from .bed import Bed
 from .cells import (
-    STEEP,
     Candidates,
     Shown,
     Standing,
@@ -27,7 +26,7 @@ from .cells import (
 )
 from .labels import Near, label
 from .lines import Lines, reach_at
-from .partner import partner_sides
+from .partner import STEEP, partner_sides
 from .pieces import SHOWN_SHARE, mean_of, pieces_of, with_partner
 from .ridges import Ridges, above_sides, cells_beside, on_crests
 from .settings import Settings, Tolerances

@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from .cells import STEEP, Kept, Shown
+from .cells import Kept, Shown
 from .labels import quantiles, sections
 from .lines import Lines
-from .partner import MAJORITY
+from .partner import MAJORITY, STEEP
 from .pieces import pieces_of, shares_of_length, to_one_side
 from .ridges import nearest
 from .settings import Settings

@@ -66,6 +66,9 @@ CRESTS_M = np.arange(-0.06, 0.061, 0.004)
 HALF_WAY = (0.5,)
 """Part of the way down at which the two sides of a ridge are: there, blur does not move the side of a head."""
 
+STEEPEST = 1.0
+"""Steepest ground beside a ridge, height per length: earth and stones do not lie at more than 45°, and walls do."""
+
 GROUND_M, GROUND_SEEN = (0.10, 0.30), 0.5
 """Distances from the axis between which the ground on one side of a ridge shows its slope, from beyond the head and its
 blurred side on, and share of the bins there that must be seen."""
@@ -185,7 +188,8 @@ def above_sides(xy: np.ndarray, height: np.ndarray, lines: Lines, piece: np.ndar
         side = np.where(is_lit[:, None], every[:, beside], lit[:, beside])
         at_axis_m, slope, seen = _straight(side, out_m[beside])
         ground_m = at_axis_m[:, None] + slope[:, None] * way * MIDDLES_M[tops]
-        rises.append(np.where(seen[:, None] < GROUND_SEEN, np.inf, crest_m - ground_m))
+        rise_m = np.where(np.abs(slope[:, None]) > STEEPEST, 0.0, crest_m - ground_m)
+        rises.append(np.where(seen[:, None] < GROUND_SEEN, np.inf, rise_m))
     return np.fmax.reduce(np.min(rises, axis=0), axis=1)
 
 

@@ -175,6 +175,12 @@ def test_a_train_above_the_ground_is_not_the_ground():
     assert above_sides(*both, lines, piece)[0] == pytest.approx(0.2, abs=0.002)
 
 
+def test_the_wall_of_a_tunnel_has_no_ridge():
+    """It is 3.6 times as steep as earth lies, and bends towards the vault (world 15415)."""
+    wall = section(lambda left_m: -3.6 * left_m - 3.5 * left_m**2)
+    assert above_sides(*wall)[0] == 0.0
+
+
 def test_axes_that_scatter_are_steadied():
     scattered = np.random.RandomState(5).uniform(-0.035, 0.035, 200)
     across_m = steadied(lines_beside(scattered)).axis[:, 1]
