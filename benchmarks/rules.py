@@ -101,7 +101,7 @@ SWITCHES = (
     _rule("classify.bars.SINGLE_RISE_M", -np.inf),
     _rule("classify.bars.STEEP", np.inf, ("classify.low", "STEEP", np.inf)),
     _rule("classify.partner._belongs_to_another", lambda lines, other, apart_m, *_: np.zeros(apart_m.shape, bool)),
-    _rule("classify.partner.majority", first),
+    _rule("classify.partner._majority", first),
     _rule("classify.labels.MIN_AXES", 1),
     _rule("classify.blunt._on_heads", lambda kept, crests, *_: replace(kept, lines=crests)),
     _rule("classify.low._on_heads", lambda shown, lines, *_: lines),

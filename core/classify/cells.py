@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 from .bed import COARSE_M, Bed, Coarse
 from .labels import Near
 from .lines import SINGLE_COVER, Ground, Lines, Marks, centred, find_lines, joined
-from .partner import are_within_gauge, have_partners, majority, runs_inside
+from .partner import are_within_gauge, have_partners, runs_inside
 from .pieces import (
     links,
     long_enough,
@@ -204,8 +204,7 @@ def free_standing(found: Candidates, bed: Bed, reach_m: float, tolerances: Toler
 def on_rails(kept: Kept, free: np.ndarray, settings: Settings, tolerances: Tolerances) -> Kept:
     """Keep cells that stand free, (n,) bool, unless they belong to guard rails, feet of rails, or short pieces."""
     kept = kept.of(are_certain(kept.lines, kept.paired, kept.pairs) & free)
-    rails = majority(kept.paired, kept.pairs)  # single cells of a trough have a partner, too
-    inside = runs_inside(kept.lines, rails, kept.pairs, settings.gauges_m, settings.head_width_m)
+    inside = runs_inside(kept.lines, kept.paired, kept.pairs, settings.gauges_m, settings.head_width_m)
     kept = kept.of(~inside)
     kept = kept.of(~lower_than_beside(kept.lines, tolerances.spread_m))
     return kept.of(are_long(kept, settings, settings.keep_single, tolerances.least_m))

@@ -226,10 +226,10 @@ def runs_inside(
     if fits is not None:
         beside &= fits(own, rail)
     inside[own[beside]] = True
-    return majority(inside, links)
+    return _majority(inside, links)
 
 
-def majority(flag: np.ndarray, links: np.ndarray) -> np.ndarray:
+def _majority(flag: np.ndarray, links: np.ndarray) -> np.ndarray:
     """Give each cell the flag of most cells on its line."""
     both = np.concatenate([links, links[:, ::-1]])
     votes = flag + np.bincount(both[:, 0], flag[both[:, 1]], len(flag))

@@ -23,11 +23,11 @@ DEPTH_M = 0.045
 AROUND_M = 0.08
 """Half the side of the window that shows the density with which a top is seen: a head, and a cell on either side."""
 
-MAX_SHARE, SHADOWED_SHARE = 0.50, 0.70
+MAX_SHARE, SHADOWED_SHARE = 0.50, 0.60
 """Largest share of the other seen cells of the window that the top may fill, also where the top is `ABOVE_STONES_M`
 above the bed and what is not seen may be in a shadow. A rail fills 0.14 to 0.25, with its foot or a guard rail 0.38,
-ballast and kerbs half and more; two heads in a switch, in whose shadows nothing of the ground is seen, 0.45 to 0.70.
-Edges of cable troughs, 0.60 to 0.65, are left to `pieces.stands_free`."""
+ballast and kerbs half and more, the edges of a cable trough 0.60 to 0.65; two heads in a switch, in whose shadows
+nothing of the ground is seen, 0.45 to 0.70."""
 
 ABOVE_STONES_M = 2 * DEPTH_M
 """Height above the bed from which a top has no stones in it, because these scatter by less than `DEPTH_M`."""
