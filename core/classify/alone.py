@@ -7,11 +7,11 @@ something hides the other rail. And the head of a rail overhangs its web, while 
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from .lines import Lines
 from .partner import SPACING_M
 from .pieces import mean_of, to_one_side
+from .ridges import nearest
 from .settings import Settings
 from .tops import HIGH_M, MILLIMETRES, Tops
 
@@ -98,8 +98,8 @@ def are_solid(lines: Lines, piece: np.ndarray, xy: np.ndarray, height: np.ndarra
     if not len(piece):
         return solid
     near = np.flatnonzero((height > lines.height.min() - BELOW_M[1]) & (height < lines.height.max() - FACE_M[0]))
-    distance_m, cell = cKDTree(lines.axis).query(xy[near], distance_upper_bound=NEAR_M)
-    near, cell = near[np.isfinite(distance_m)], cell[np.isfinite(distance_m)]
+    within, cell = nearest(xy[near], lines.axis, NEAR_M)
+    near = near[within]
     across = np.einsum("ij,ij->i", xy[near] - lines.axis[cell], to_one_side(lines, piece)[cell])
     depth, number = lines.height[cell] - height[near], piece[cell]
     for one in np.flatnonzero(mean_m >= BELOW_M[1] + BED_M):

@@ -66,8 +66,8 @@ CRESTS_M = np.arange(-0.06, 0.061, 0.004)
 HALF_WAY = (0.5,)
 """Part of the way down at which the two sides of a ridge are: there, blur does not move the side of a head."""
 
-STEEPEST = 1.0
-"""Steepest ground beside a ridge, height per length: earth and stones do not lie at more than 45°, and walls do."""
+REPOSE = 1.0
+"""Steepest slope at which earth and stones lie, height per length. Walls are steeper."""
 
 GROUND_M, GROUND_SEEN = (0.10, 0.30), 0.5
 """Distances from the axis between which the ground on one side of a ridge shows its slope, from beyond the head and its
@@ -173,9 +173,10 @@ def above_sides(xy: np.ndarray, height: np.ndarray, lines: Lines, piece: np.ndar
 
     Points are given by place and height above the bed. The edge of a slab or a shoulder is a crest as well, but the
     ground on one side leads up to it. A side that is not seen does not count; without a crest, the height is NaN.
-    What is higher above a ridge than ground that rises at 45° is a train, a roof or a bridge, and does not count.
+    What is higher above a ridge than ground at the angle of repose is a train, a roof or a bridge, and does not count.
+    What lies on steeper ground is on a wall, and does not stand above it at all.
     """
-    count, rise = _profiles(xy, height, lines, to_one_side(lines, piece), piece, GROUND_M[1])
+    count, rise = _profiles(xy, height, lines, to_one_side(lines, piece), piece, REPOSE * GROUND_M[1])
     lit, every = (_shown(count, rise, share) for share in (LIT_SHARE, 0.0))
     tops = np.flatnonzero(np.abs(MIDDLES_M) < CREST_M)
     with np.errstate(invalid="ignore"):
@@ -188,7 +189,7 @@ def above_sides(xy: np.ndarray, height: np.ndarray, lines: Lines, piece: np.ndar
         side = np.where(is_lit[:, None], every[:, beside], lit[:, beside])
         at_axis_m, slope, seen = _straight(side, out_m[beside])
         ground_m = at_axis_m[:, None] + slope[:, None] * way * MIDDLES_M[tops]
-        rise_m = np.where(np.abs(slope[:, None]) > STEEPEST, 0.0, crest_m - ground_m)
+        rise_m = np.where(np.abs(slope[:, None]) > REPOSE, 0.0, crest_m - ground_m)
         rises.append(np.where(seen[:, None] < GROUND_SEEN, np.inf, rise_m))
     return np.fmax.reduce(np.min(rises, axis=0), axis=1)
 

@@ -132,8 +132,13 @@ def run_through(network: LineNetwork) -> LineNetwork:
 
 def deflections(network: LineNetwork, ends: Sequence[int]) -> np.ndarray:
     """Measure by how much a line that arrives at one end would turn to continue at another, (k, k) degrees."""
-    outward = np.array([tip_and_direction(even_points(network.from_end(end), DIRECTION_M))[1] for end in ends])
+    outward = outward_ways(network, ends, DIRECTION_M)
     return np.degrees(np.arccos(np.clip(-outward @ outward.T, -1.0, 1.0)))
+
+
+def outward_ways(network: LineNetwork, ends: Sequence[int], length_m: float) -> np.ndarray:
+    """Return the unit vectors out of lines at some of their ends, (k, 2), by the last `length_m` of each."""
+    return np.array([tip_and_direction(even_points(network.from_end(end), length_m))[1] for end in ends])
 
 
 def _straightest(network: LineNetwork, ends: Sequence[int]) -> dict[int, int]:

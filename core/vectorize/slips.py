@@ -19,7 +19,7 @@ from ..lines.ends import STEP_M, even_points, tip_and_direction
 from ..lines.network import LineNetwork
 from ..polyline import runs
 from .cells import RailCells
-from .junctions import DIRECTION_M, points_of, weld_pairs
+from .junctions import DIRECTION_M, ends_by_node, outward_ways, points_of, weld_pairs
 
 CLEAR_M = (8.0, 11.0, 14.0, 17.0, 20.0)
 """Distances from the middle of a slip from which its legs are taken for those of the crossing, tried in this order."""
@@ -232,10 +232,11 @@ def _candidates(network: LineNetwork, spacings_m: Sequence[float]) -> np.ndarray
     """
     if not network.lines:
         return np.empty((0, 2))
-    junctions = np.flatnonzero(network.degrees() > 2)
-    nodes = network.nodes[junctions]
+    junctions = [(node, ends) for node, ends in ends_by_node(network) if len(ends) > 2]
+    nodes = network.nodes[[node for node, _ in junctions]].reshape(-1, 2)
+    ways = [outward_ways(network, ends, FROG_M) for _, ends in junctions]
     middles = [
-        nodes[pairs].mean(axis=1) for pairs in (_pairs(nodes, 2 * NODE_M), _acute_frogs(network, junctions, spacings_m))
+        nodes[pairs].mean(axis=1) for pairs in (_pairs(nodes, 2 * NODE_M), _acute_frogs(nodes, ways, spacings_m))
     ]
     places = np.concatenate([*middles, nodes, _Parts.of(network).approaches()])
     _, first = np.unique(np.round(places), axis=0, return_index=True)
@@ -247,30 +248,23 @@ def _pairs(nodes: np.ndarray, most_m: float) -> np.ndarray:
     return cKDTree(nodes).query_pairs(most_m, output_type="ndarray") if len(nodes) else np.empty((0, 2), dtype=int)
 
 
-def _acute_frogs(network: LineNetwork, junctions: np.ndarray, spacings_m: Sequence[float]) -> np.ndarray:
-    """Return which junctions may be the two acute frogs of a crossing, (k, 2) numbers of `junctions`.
+def _acute_frogs(nodes: np.ndarray, ways: Sequence[np.ndarray], spacings_m: Sequence[float]) -> np.ndarray:
+    """Return which nodes, (n, 2), may be the two acute frogs of a crossing, (k, 2) numbers.
 
-    Their distance states the angle of the crossing, and at both of them lines leave at half of it to either side of the
-    way to the other one.
+    Their distance states the angle of the crossing, and at both of them lines leave, in the `ways` of each, at half of
+    it to either side of the way to the other one.
     """
-    ways = [_ways(network, node) for node in junctions.tolist()]
     found = [np.empty((0, 2), dtype=int)]
     for spacing_m in spacings_m:
-        pairs = _pairs(network.nodes[junctions], spacing_m / np.sin(np.radians(MIN_ANGLE_DEG / 2)))
-        step = np.diff(network.nodes[junctions[pairs]], axis=1)[:, 0]
+        pairs = _pairs(nodes, spacing_m / np.sin(np.radians(MIN_ANGLE_DEG / 2)))
+        step = nodes[pairs[:, 1]] - nodes[pairs[:, 0]]
         half_deg = np.degrees(np.arcsin(spacing_m / np.maximum(np.hypot(*step.T), spacing_m)))
         fits = [
-            _leave(ways[one], along, angle_deg) and _leave(ways[other], along, angle_deg)
-            for (one, other), along, angle_deg in zip(pairs, step, half_deg)
+            all(_leave(ways[node], along, angle_deg) for node in pair)
+            for pair, along, angle_deg in zip(pairs, step, half_deg)
         ]
         found.append(pairs[(2 * half_deg < MAX_ANGLE_DEG) & np.array(fits, dtype=bool)])
     return np.concatenate(found)
-
-
-def _ways(network: LineNetwork, node: int) -> np.ndarray:
-    """Return the unit vectors along the lines that end at a node, (n, 2)."""
-    ends = np.flatnonzero(network.ends.ravel() == node).tolist()
-    return np.array([tip_and_direction(even_points(network.from_end(end), FROG_M))[1] for end in ends])
 
 
 def _leave(ways: np.ndarray, along: np.ndarray, angle_deg: float) -> bool:
@@ -389,7 +383,7 @@ def _as_crossing(network: LineNetwork, slip: Slip) -> tuple[LineNetwork, int]:
     ends: list[tuple[int, int]] = []
     nodes = [*network.nodes, slip.cross.place, slip.cross.place]
     for line, own in zip(network.lines, network.ends.tolist()):
-        even = even_points(line)  # vertices are metres apart, and frogs are 1 m outside
+        even = even_points(line)  # vertices are metres apart: the next one may be at the frog
         line = even if slip.holds(even).any() else line
         outside = ~slip.holds(line)
         for first, last in runs(outside):

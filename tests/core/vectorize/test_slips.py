@@ -81,7 +81,7 @@ def lines_around_a_slip(number=9.0, radius_m=190.0, hidden_m=5.0):
 
 def test_a_slip_is_found_by_its_acute_frogs_where_its_middle_is_hidden():
     network = lines_around_a_slip()
-    network, slips = open_slips(network, RailCells(cells_of(network.lines), [SPACING_M]))
+    _, slips = open_slips(network, RailCells(cells_of(network.lines), [SPACING_M]))
     np.testing.assert_allclose(sorted(slip.cross.place[1] for slip in slips), [0.0, SPACING_M], atol=0.02)
     assert [len(slip.curves) for slip in slips] == [1, 1]
     heights = [slip.curves[0].height for slip in slips]
@@ -125,9 +125,10 @@ def test_a_leg_is_taken_from_the_border_of_a_slip_however_far_apart_its_vertices
     first, *others = lines_beside_a_slip()
     first = first[(first[:, 0] < 7.95) | ((first[:, 0] > 12.0) & (first[:, 0] < 14.0))]
     first[first[:, 0] > 13.4, 1] -= 0.4
-    network, slips = opened([first, *others], cells_of(lines_beside_a_slip()))
+    seen = cells_of(lines_beside_a_slip())
+    network, slips = opened([first, *others], seen)
     assert len(slips) == 2
-    drawn = follow_courses(network, RailCells(cells_of(lines_beside_a_slip()), [SPACING_M]), 5.0, 10.0).lines
+    drawn = follow_courses(network, RailCells(seen, [SPACING_M]), 5.0, 10.0).lines
     assert sorted(round(np.ptp(line[:, 0])) for line in drawn) == [LENGTH_M + 14, *[2 * LENGTH_M] * 3]
 
 
