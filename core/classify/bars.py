@@ -64,9 +64,15 @@ lower ones are too low to count in places."""
 
 
 def on_bars(
-    kept: Kept, thin: bool, found: Candidates, shown: Shown, settings: Settings, tolerances: Tolerances
+    kept: Kept,
+    thin: bool,
+    found: Candidates,
+    shown: Shown,
+    settings: Settings,
+    tolerances: Tolerances,
+    low: Kept | None = None,
 ) -> Standing:
-    """Keep the cells of pieces that are as narrow as a head."""
+    """Keep the cells of pieces that are as narrow as a head; `low` are rails that hardly stand out of their bed."""
     cells = _completed(found, kept, settings, tolerances)
     heads = whole_heads(shown.tops, cells, tolerances)
     chosen = label(shown.tops, heads, shown.cell, shown.height, tolerances)
@@ -79,7 +85,8 @@ def on_bars(
     sharp_m, round_m, unsure_m, clear_m = (float(share_m[kind].sum()) for kind in (*kinds, clear))
     kept = _with_kept_partners(kept.of(narrow), settings, tolerances)
     beside = Near.find(shown.xy[chosen], kept.lines)
-    rails = _are_rails(kept, thin, beside, shown, settings, tolerances)
+    others = _are_guards(kept, low, shown, settings, tolerances.partner_m)
+    rails = _are_rails(kept, others, thin, beside, shown, settings, tolerances)
     standing = as_wanted(kept, rails, chosen, beside, thin, settings, tolerances)
     points = standing.points
     if not thin:  # from the air, nothing hides a head
@@ -130,20 +137,23 @@ def _by_shape(
 
 
 def _are_rails(
-    kept: Kept, thin: bool, beside: Near, shown: Shown, settings: Settings, tolerances: Tolerances
+    kept: Kept,
+    others: np.ndarray,
+    thin: bool,
+    beside: Near,
+    shown: Shown,
+    settings: Settings,
+    tolerances: Tolerances,
 ) -> np.ndarray:
     """Return which cells of narrow pieces belong to rails, (n,) bool: those of a track, and some others.
 
     Rails without a partner are as narrow as a head and no narrower, stand as high as a rail does that is not buried in
     ballast, or as those that have a partner, on a bed that is not steep, and above the ground on either side. They are
-    not guard rails, they overhang, which thin squares do not show, and the other rail may be hidden. `beside`
-    has the points in the height of the heads, and the cells near them.
+    not guard or third rails, which are `others`, (n,) bool, they overhang, which thin squares do not show, and the
+    other rail may be hidden. `beside` has the points in the height of the heads, and the cells near them.
     """
-    partnered = with_partner(kept.pairs, kept.paired)
+    partnered = with_partner(kept.pairs, kept.paired) & ~others
     piece = pieces_of(len(kept.cell), kept.pairs)
-    z = shown.tops.z.ravel()[kept.cell]
-    others = _are_guards(kept, z, settings, tolerances.partner_m)
-    partnered &= ~others
     if partnered.all():
         return partnered
     width_m, height_m = beside.widths(kept.lines, piece), mean_of(kept.lines.height, piece)
@@ -156,7 +166,10 @@ def _are_rails(
         high = np.where(height_m > UNDER_FOOT_M, off_m < tolerances.partner_m, high | (off_m < AS_HIGH_M))
     slope = np.hypot(*shown.bed.gradients(kept.lines.axis).T)
     alone = narrow & high & (mean_of(slope, piece) <= STEEP)
-    alone &= above_sides(shown.xy, shown.z, replace(kept.lines, height=z), piece) >= SINGLE_RISE_M
+    alone &= (
+        above_sides(shown.xy, shown.z, replace(kept.lines, height=shown.tops.z.ravel()[kept.cell]), piece)
+        >= SINGLE_RISE_M
+    )
     mine = alone[piece] & ~partnered
     lines, (numbers, number) = kept.lines.of(mine), np.unique(piece[mine], return_inverse=True)
     alone[numbers] = may_hide_partner(lines, number, kept.cell[mine], shown.tops, settings, tolerances.partner_m)
@@ -165,15 +178,20 @@ def _are_rails(
     return partnered | (alone[piece] & ~others)
 
 
-def _are_guards(kept: Kept, z: np.ndarray, settings: Settings, height_m: float) -> np.ndarray:
+def _are_guards(kept: Kept, low: Kept | None, shown: Shown, settings: Settings, height_m: float) -> np.ndarray:
     """Return which cells are of guard or third rails of a longer one, or of one with a partner, (n,) bool.
+
+    Rails of a track may be among the kept ones, or among those that hardly stand out of their bed, `low`.
 
     A guard rail is as high as the rail within a gauge that it guards; it ends before that, and hides it from a scanner
     beside the track, so that the rail seems to go on as the guard rail. A third rail is higher and at most a little
     further away than the other rail; what is as far from a track on its outer side is a rail of the next one.
     `height_m` is the largest difference of partners.
     """
-    lines = kept.lines
+    count = len(kept.cell)
+    if low is not None:
+        kept = kept.with_others(low, settings.head_width_m)
+    lines, z = kept.lines, shown.tops.z.ravel()[kept.cell]
     pairs = kept.pairs
     piece = pieces_of(len(kept.cell), pairs)
     length_m = np.where(with_partner(pairs, kept.paired), np.inf, lengths(lines.axis, piece)[piece])
@@ -195,4 +213,4 @@ def _are_guards(kept: Kept, z: np.ndarray, settings: Settings, height_m: float) 
         return (rise_above(lines, rail, own, rail) > HIGHER_M) & ~outside
 
     thirds = inside(THIRD_RAIL_M, higher)
-    return ((mean_of(guards, piece) > MAJORITY) | (mean_of(thirds, piece) > MAJORITY))[piece]
+    return ((mean_of(guards, piece) > MAJORITY) | (mean_of(thirds, piece) > MAJORITY))[piece[:count]]

@@ -153,7 +153,11 @@ def joined(one: Lines, other: Lines) -> Lines:
     columns = ((one.axis, other.axis), (one.height, other.height), (one.theta, other.theta))
     shares = ((one.cover, other.cover), (one.pure, other.pure))
     axis, height, theta, cover, pure = (np.concatenate(pair) for pair in (*columns, *shares))
-    return Lines(axis, height, theta, cover, pure, one.reach_m)
+    ground = None
+    if one.ground is not None and other.ground is not None:
+        z, slope = np.append(one.ground.z, other.ground.z), np.concatenate([one.ground.slope, other.ground.slope])
+        ground = Ground(z, slope)
+    return Lines(axis, height, theta, cover, pure, one.reach_m, ground)
 
 
 def turns(one: np.ndarray, other: np.ndarray) -> np.ndarray:

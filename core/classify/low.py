@@ -25,7 +25,7 @@ from .cells import (
     with_pairs,
 )
 from .labels import Near, label
-from .lines import Lines, reach_at
+from .lines import Ground, Lines, reach_at
 from .partner import STEEP, partner_sides
 from .pieces import SHOWN_SHARE, mean_of, pieces_of, with_partner
 from .ridges import Ridges, above_sides, cells_beside, on_crests
@@ -120,7 +120,9 @@ def on_low(shown: Shown, settings: Settings) -> Standing:
         heads &= above_sides(of_heads.xy, above_bed[low_enough], kept.lines, piece) >= RISE_M
         heads &= _slopes_to_partners(kept.lines, piece, shown.bed, settings, tolerances) <= STEEP
         kept = fitting(kept, piece, heads, settings, tolerances)
-        kept = replace(kept, lines=_on_heads(of_heads, kept.lines, settings.head_width_m))
+        lines = _on_heads(of_heads, kept.lines, settings.head_width_m)
+        ground = Ground(shown.tops.z.ravel()[kept.cell], shown.bed.gradients(lines.axis))
+        kept = replace(kept, lines=replace(lines, ground=ground))
     cells = cells_beside(grid, kept.lines, (settings.head_width_m - grid.cell_m) / 2)
     chosen = label(shown.tops, cells, shown.cell, shown.height, tolerances)
     beside = Near.find(shown.xy[chosen], kept.lines)

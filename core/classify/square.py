@@ -10,7 +10,7 @@ from ..rails import SearchFigures
 from .bars import on_bars
 from .bed import COARSE_M, Bed
 from .blunt import on_ridges
-from .cells import Candidates, Shown, Standing, density_at, free_standing, own_lengths
+from .cells import Candidates, Kept, Shown, Standing, density_at, free_standing, own_lengths
 from .flush import NO_FLUSH, Flush, NearBed, flush_rails
 from .lines import Lines, reach_at
 from .low import on_low
@@ -102,18 +102,22 @@ def _standing(shown: Shown, level: np.ndarray, paved: Flush, settings: Settings)
     """Find rails that stand out of their bed, and in a cloud with filled tracks also those that hardly do."""
     if settings.way is not Way.FILLED:
         return _clear(shown, settings)
-    clear = _clear(shown, replace(settings, way=Way.SHARP))
+    sharp = replace(settings, way=Way.SHARP)
     dense_m2 = COARSE_M**2 * np.count_nonzero(shown.bed.coarse.count >= THIN_PER_M2 * COARSE_M**2)
     if dense_m2 < LEAST_DENSE_M2:
-        return clear
+        return _clear(shown, sharp)
     ground = level == 0  # the vault of a tunnel is as rough as ballast
     ground[paved.street(shown.xy)] = False  # no head stands out there
     low = on_low(shown.of(ground), settings)
+    clear = _clear(shown, sharp, low.rails)
     return clear.with_others(replace(low, points=np.flatnonzero(ground)[low.points]), settings.head_width_m)
 
 
-def _clear(shown: Shown, settings: Settings) -> Standing:
-    """Find rails that stand clear of their bed: bars as narrow as a head, or the ridges of a blunt cloud."""
+def _clear(shown: Shown, settings: Settings, low: Kept | None = None) -> Standing:
+    """Find rails that stand clear of their bed: bars as narrow as a head, or the ridges of a blunt cloud.
+
+    Third rails beside `low` rails that hardly stand out are not rails of a track.
+    """
     found = Candidates.find(shown, settings.tolerances(thin=False).band)
     density = density_at(shown.bed.coarse, shown.tops.grid.middles(found.marks))
     thin = density < THIN_PER_M2
@@ -121,7 +125,7 @@ def _clear(shown: Shown, settings: Settings) -> Standing:
     kept = free_standing(found, shown.bed, reach_at(density), tolerances, settings)
     if settings.blunt:
         return on_ridges(kept, thin, shown, settings)
-    return on_bars(kept, thin, found, shown, settings, tolerances)
+    return on_bars(kept, thin, found, shown, settings, tolerances, low)
 
 
 def _standing_figures(standing: Standing, settings: Settings) -> SearchFigures:

@@ -101,3 +101,16 @@ def test_no_track_is_steeper_across_than_its_cant(slope, is_track):
         ground = with_bar(ground, 0.072, left_m=left_m, height_m=0.025)[0]
     rail = classify_square(ground, Settings((1.435,), 0.072, way=Way.FILLED)).rail
     assert rail.any() == is_track
+
+
+def test_what_is_higher_beside_rails_that_hardly_stand_out_is_a_third_rail():
+    """Another search finds the rails themselves (worlds 15382 and 15510)."""
+    xyz, rails = flat(16.0, rng=np.random.RandomState(4), per_m2=2000), np.zeros(512_000, dtype=bool)
+    ground = rough(xyz, np.random.RandomState(5), 0.004)
+    for left_m in (0.754, -0.754):
+        ground, on = with_bar(ground, 0.072, left_m=left_m, height_m=0.025)
+        rails |= on
+    ground, third = with_bar(ground, 0.072, left_m=1.15, height_m=0.2)
+    rail = classify_square(ground, Settings((1.435,), 0.072, way=Way.FILLED)).rail
+    assert rail[rails].mean() > 0.9
+    assert not rail[third].any()
