@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 from .bed import COARSE_M, Bed, Coarse
 from .labels import Near
 from .lines import SINGLE_COVER, Ground, Lines, Marks, centred, find_lines, joined
-from .partner import are_within_gauge, have_partners, runs_inside
+from .partner import CANT, are_within_gauge, have_partners, runs_inside
 from .pieces import (
     links,
     long_enough,
@@ -33,9 +33,6 @@ from .tops import (
 
 DENSITY_QUANTILE = 0.75
 """Quantile, over the coarse cells with candidates, of the points per square metre that stand for the square."""
-
-CANT = 0.12
-"""Steepest slope of a track across, height per length: 180 mm over 1.5 m."""
 
 NOISE_ACROSS_M = 0.01
 """Largest distance beyond the side of a head at which the top of a cell counts towards its axis. With half the gap to
@@ -119,6 +116,13 @@ class Kept:
         pairs = number[self.pairs[chosen[self.pairs].all(axis=1)]]
         return Kept(self.lines.of(chosen), self.cell[chosen], self.paired[chosen], pairs)
 
+    def on_ground(self, tops: Tops, bed: Bed) -> Kept:
+        """Add the heights of the cells as such, and the slopes of their beds."""
+        slope = bed.gradients(self.lines.axis)
+        steep = np.abs(np.einsum("ij,ij->i", slope, self.lines.across)) > CANT
+        ground = Ground(tops.z.ravel()[self.cell], np.where(steep[:, None], np.nan, slope))
+        return replace(self, lines=replace(self.lines, ground=ground))
+
     def with_others(self, other: Kept, apart_m: float) -> Kept:
         """Put cells behind these that are further than `apart_m` from all of them; these state the reach of both."""
         if len(self.cell):
@@ -186,13 +190,10 @@ def _on_middles(lines: Lines, found: Candidates, tolerances: Tolerances, setting
 def free_standing(found: Candidates, bed: Bed, reach_m: float, tolerances: Tolerances, settings: Settings) -> Kept:
     """Keep the candidates that lie on rails and stand free of what is beside them."""
     kept = on_lines(found, reach_m, tolerances, settings)
-    slope = bed.gradients(kept.lines.axis)
-    cant = np.einsum("ij,ij->i", slope, kept.lines.across)
-    steep = np.abs(cant) > CANT
-    cant[steep] = 0.0
+    grounded = kept.on_ground(found.tops, bed)
+    cant = np.nan_to_num(np.einsum("ij,ij->i", grounded.lines.ground.slope, kept.lines.across))
     if tolerances.band.shadows:
-        ground = Ground(found.tops.z.ravel()[kept.cell], np.where(steep[:, None], np.nan, slope))
-        kept = replace(kept, lines=replace(kept.lines, ground=ground))
+        kept = grounded
     kept = kept.of(are_free(kept, found.tops, _depth_m(kept, tolerances), cant))
     kept = with_pairs(kept, settings, tolerances)
     alone = kept.of(~kept.paired)

@@ -12,7 +12,6 @@ from functools import cached_property
 import numpy as np
 from scipy.ndimage import uniform_filter
 
-from .bed import Bed
 from .cells import (
     Candidates,
     Shown,
@@ -25,11 +24,10 @@ from .cells import (
     with_pairs,
 )
 from .labels import Near, label
-from .lines import Ground, Lines, reach_at
-from .partner import STEEP, partner_sides
-from .pieces import SHOWN_SHARE, mean_of, pieces_of, with_partner
+from .lines import Lines, reach_at
+from .pieces import SHOWN_SHARE, pieces_of, with_partner
 from .ridges import Ridges, above_sides, cells_beside, on_crests
-from .settings import Settings, Tolerances
+from .settings import Settings
 from .tops import EMPTY, MILLIMETRES, WINDOW_M, Grid
 
 DOUBLINGS = (5, 6)
@@ -108,7 +106,8 @@ def on_low(shown: Shown, settings: Settings) -> Standing:
     shown = replace(shown, height=above, tops=replace(shown.tops, top=rise))
     found = Candidates.of(shown, np.flatnonzero(low.crest))
     density = density_at(shown.bed.coarse, grid.middles(found.marks))
-    kept = with_pairs(on_lines(found, reach_at(density), tolerances, settings), settings, tolerances)
+    kept = on_lines(found, reach_at(density), tolerances, settings).on_ground(shown.tops, shown.bed)
+    kept = with_pairs(kept, settings, tolerances)
     kept = on_rails(kept, np.ones(len(kept.cell), dtype=bool), settings, tolerances)
     kept = kept.of(with_partner(kept.pairs, kept.paired))
     if len(kept.cell):
@@ -118,24 +117,12 @@ def on_low(shown: Shown, settings: Settings) -> Standing:
         width_m = Ridges.measure(of_heads.xy, of_heads.height, kept.lines, piece, SHOWN_SHARE).width_m
         heads = ~(width_m >= settings.head_width_m + tolerances.wider_m)  # where one side is hidden, this is not known
         heads &= above_sides(of_heads.xy, above_bed[low_enough], kept.lines, piece) >= RISE_M
-        heads &= _slopes_to_partners(kept.lines, piece, shown.bed, settings, tolerances) <= STEEP
         kept = fitting(kept, piece, heads, settings, tolerances)
-        lines = _on_heads(of_heads, kept.lines, settings.head_width_m)
-        ground = Ground(shown.tops.z.ravel()[kept.cell], shown.bed.gradients(lines.axis))
-        kept = replace(kept, lines=replace(lines, ground=ground))
+        kept = replace(kept, lines=_on_heads(of_heads, kept.lines, settings.head_width_m))
     cells = cells_beside(grid, kept.lines, (settings.head_width_m - grid.cell_m) / 2)
     chosen = label(shown.tops, cells, shown.cell, shown.height, tolerances)
     beside = Near.find(shown.xy[chosen], kept.lines)
     return as_wanted(kept, np.ones(len(kept.cell), dtype=bool), chosen, beside, False, settings, tolerances)
-
-
-def _slopes_to_partners(
-    lines: Lines, piece: np.ndarray, bed: Bed, settings: Settings, tolerances: Tolerances
-) -> np.ndarray:
-    """Return how steep the bed is, across each piece, midway to its partner, (pieces,)."""
-    side = partner_sides(lines, settings.spacings_m, tolerances.partner_m, tolerances.worse_m)
-    middle = lines.axis + 0.5 * min(settings.spacings_m) * side[:, None] * lines.across
-    return mean_of(np.abs(np.einsum("ij,ij->i", bed.gradients(middle), lines.across)), piece)
 
 
 def _on_heads(shown: Shown, lines: Lines, head_width_m: float) -> Lines:

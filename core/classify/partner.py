@@ -27,10 +27,12 @@ SPACING_M = 0.055
 ANGLE_RAD = 0.12
 """Angle between the two rails of a track: those of a turnout with a guard rail's mouth stay below."""
 
+CANT = 0.12
+"""Steepest slope of a track across, height per length: 180 mm over 1.5 m."""
+
 STEEP = 0.3
 """Steepest bed of a rail: the cant, and as much again for a plane of the bed that is laid through cells of a shoulder.
-Measured: 0.22 at most, and 0.36 and more between the edges of a bank that are at gauge from each other (world 14682),
-and at crests whose far side is hidden."""
+Measured: 0.22 at most, and 0.36 and more at crests whose far side is hidden."""
 
 CANDIDATES = 6
 """Lines that are looked at for one station: other rails may be near at turnouts."""
@@ -178,7 +180,7 @@ def _are_level(lines: Lines, own: np.ndarray, other: np.ndarray, height_m: float
     for bed in (own, other):
         level |= np.abs(rise_above(lines, own, other, bed)) < height_m
     distance_m = np.hypot(*(lines.axis[other] - lines.axis[own]).T)
-    return level & (np.abs(lines.ground.z[other] - lines.ground.z[own]) < STEEP * distance_m + height_m)
+    return level & (np.abs(lines.ground.z[other] - lines.ground.z[own]) < CANT * distance_m + height_m)
 
 
 def rise_above(lines: Lines, own: np.ndarray, other: np.ndarray, bed: np.ndarray) -> np.ndarray:
