@@ -36,7 +36,7 @@ FACE_M, BELOW_M = (0.01, 0.025), (0.055, 0.10)
 """Depths below the top of the face of a head, and of what is below the head: its web, above the foot. The face of the
 lightest rails ends at 25 mm."""
 
-BED_M = 0.03
+BED_M = 0.02
 """Least height of these depths above the bed, whose stones lie against the web."""
 
 NEAR_M, BESIDE_M = 0.25, 0.03

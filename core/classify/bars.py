@@ -58,9 +58,9 @@ SHARP_WIDER_M = 0.011
 cloud and more: up to 5 mm by scanners on the ground, 10 mm by some wide beams from the air, and from 11 mm on
 in images that blur by 2 cm."""
 
-CLEAR_M = LOW_M + 0.015
-"""Least mean height above its bed of a piece that stands clear of it: ballast scatters by up to 15 mm, so that tops of
-lower ones are too low to count in places."""
+CLEAR_M = LOW_M + 0.045
+"""Least mean height above its bed of a piece that stands clear of it: ballast scatters by up to 15 mm, and passes
+differ by up to 30 mm in height, so that tops of lower ones are too low to count in places."""
 
 
 def on_bars(

@@ -117,11 +117,14 @@ class Kept:
         return Kept(self.lines.of(chosen), self.cell[chosen], self.paired[chosen], pairs)
 
     def on_ground(self, tops: Tops, bed: Bed) -> Kept:
-        """Add the heights of the cells as such, and the slopes of their beds."""
-        slope = bed.gradients(self.lines.axis)
-        steep = np.abs(np.einsum("ij,ij->i", slope, self.lines.across)) > CANT
-        ground = Ground(tops.z.ravel()[self.cell], np.where(steep[:, None], np.nan, slope))
-        return replace(self, lines=replace(self.lines, ground=ground))
+        """Add the heights of the cells as such, and the slopes of their beds where these may be those of tracks."""
+        slope = np.where(np.isnan(self.cant(bed))[:, None], np.nan, bed.gradients(self.lines.axis))
+        return replace(self, lines=replace(self.lines, ground=Ground(tops.z.ravel()[self.cell], slope)))
+
+    def cant(self, bed: Bed) -> np.ndarray:
+        """Return the slopes of the bed across, (n,): those that no track has are NaN."""
+        cant = np.einsum("ij,ij->i", bed.gradients(self.lines.axis), self.lines.across)
+        return np.where(np.abs(cant) > CANT, np.nan, cant)
 
     def with_others(self, other: Kept, apart_m: float) -> Kept:
         """Put cells behind these that are further than `apart_m` from all of them; these state the reach of both."""
@@ -190,10 +193,9 @@ def _on_middles(lines: Lines, found: Candidates, tolerances: Tolerances, setting
 def free_standing(found: Candidates, bed: Bed, reach_m: float, tolerances: Tolerances, settings: Settings) -> Kept:
     """Keep the candidates that lie on rails and stand free of what is beside them."""
     kept = on_lines(found, reach_m, tolerances, settings)
-    grounded = kept.on_ground(found.tops, bed)
-    cant = np.nan_to_num(np.einsum("ij,ij->i", grounded.lines.ground.slope, kept.lines.across))
+    cant = np.nan_to_num(kept.cant(bed))
     if tolerances.band.shadows:
-        kept = grounded
+        kept = kept.on_ground(found.tops, bed)
     kept = kept.of(are_free(kept, found.tops, _depth_m(kept, tolerances), cant))
     kept = with_pairs(kept, settings, tolerances)
     alone = kept.of(~kept.paired)

@@ -30,6 +30,9 @@ ANGLE_RAD = 0.12
 CANT = 0.12
 """Steepest slope of a track across, height per length: 180 mm over 1.5 m."""
 
+NOISE_M = 0.02
+"""Difference in height of the two heads of a track beyond its cant, which noise and stray points on them make."""
+
 STEEP = 0.3
 """Steepest bed of a rail: the cant, and as much again for a plane of the bed that is laid through cells of a shoulder.
 Measured: 0.22 at most, and 0.36 and more at crests whose far side is hidden."""
@@ -180,7 +183,7 @@ def _are_level(lines: Lines, own: np.ndarray, other: np.ndarray, height_m: float
     for bed in (own, other):
         level |= np.abs(rise_above(lines, own, other, bed)) < height_m
     distance_m = np.hypot(*(lines.axis[other] - lines.axis[own]).T)
-    return level & (np.abs(lines.ground.z[other] - lines.ground.z[own]) < CANT * distance_m + height_m)
+    return level & (np.abs(lines.ground.z[other] - lines.ground.z[own]) < CANT * distance_m + NOISE_M)
 
 
 def rise_above(lines: Lines, own: np.ndarray, other: np.ndarray, bed: np.ndarray) -> np.ndarray:

@@ -20,7 +20,11 @@ SWITCHES = [(CLASSIFIED, seed) for seed in (10958, 11157, 11383)]
 found one by one, and if a link counts as left out that another join uses."""
 
 
-@pytest.mark.parametrize(("cloud", "seed"), FIXED + SWITCHES)
+FILLED = [(RAW, 15606)]
+"""A world that fails if rails 7 to 10 cm above their bed count as clear of it."""
+
+
+@pytest.mark.parametrize(("cloud", "seed"), FIXED + SWITCHES + FILLED)
 def test_a_world_is_extracted_without_a_fault(cloud, seed):
     judged = run(make(seed, cloud))
     assert judged.faults == (), judged.figures

@@ -19,10 +19,10 @@ def test_the_partner_of_each_rail_is_on_the_side_of_the_other_one():
 
 
 @pytest.mark.parametrize(
-    ("rise_m", "partnered"), [(0.0, True), (0.18, True), (0.43, False), (6.5, False), (-6.5, False)]
+    ("rise_m", "partnered"), [(0.0, True), (0.18, True), (0.215, False), (0.43, False), (6.5, False), (-6.5, False)]
 )
 def test_what_is_as_high_above_another_bed_is_not_the_partner(rise_m, partnered):
-    """A cant of 180 mm is the largest; berms of a bank differ by more, and a vault by metres (15544, 15415)."""
+    """A cant of 180 mm is the largest; slabs, berms of a bank and a vault differ by more (15669, 15544, 15415)."""
     along_m = np.tile(np.arange(0.0, 6.0, 0.08), 2)
     other = np.repeat([0.0, 1.0], len(along_m) // 2)
     one = np.ones(len(along_m))

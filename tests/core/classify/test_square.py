@@ -317,6 +317,21 @@ def test_a_lone_bar_overhangs_if_it_is_a_rail(behind_m, kept):
     assert classify_square(np.concatenate([rough(xyz, rng), face]), SETTINGS).rail.any() == kept
 
 
+@pytest.mark.parametrize(("behind_m", "kept"), [(0.0, False), (0.028, True)])
+def test_a_lone_bar_as_low_as_rails_in_ballast_overhangs_if_it_is_a_rail(behind_m, kept):
+    """In world 15630, a kerb was 12.3 cm high."""
+    rng = np.random.RandomState(22)
+    track, on = with_track(flat(16.0, rng=rng, per_m2=1200), GAUGE, WIDTH, 0.0)
+    track[on, 2] = 0.125
+    xyz, bar = with_bar(track, WIDTH, 0.0, 5.0, 0.125)
+    shown = turned(xyz, 0.0)[1] < 5.2
+    xyz, bar = rough(xyz[shown], rng, 0.005), bar[shown]
+    along, below = rng.uniform(-7.5, 7.5, 9000), rng.uniform(0.0, 0.125, 9000)
+    left = 5.0 - WIDTH / 2 + np.where(below < 0.04, 0.0, behind_m)
+    face = np.column_stack([along + MIDDLE[0], left + MIDDLE[1], 0.125 - below])
+    assert classify_square(np.concatenate([xyz, face]), SETTINGS).rail[: len(xyz)][bar].any() == kept
+
+
 @pytest.mark.parametrize(("higher_m", "kept"), [(0.07, False), (0.0, True)])
 def test_what_hides_a_rail_and_is_higher_just_outside_its_track_is_a_third_rail(higher_m, kept):
     """Neither bar has a partner; bars that are as high may be rails of two tracks."""

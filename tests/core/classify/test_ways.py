@@ -180,7 +180,7 @@ def test_beside_a_head_that_stands_low_the_ground_is_lower_by_half_its_height():
     assert searched(filled_track(0.045, 1500, rough_m=0.01), Way.SHARP).paired_m == pytest.approx(2 * 16.0, abs=1.0)
 
 
-@pytest.mark.parametrize(("rise_m", "clear_m"), [(0.053, 0.0), (0.09, 2 * 16.0)])
+@pytest.mark.parametrize(("rise_m", "clear_m"), [(0.053, 0.0), (0.08, 0.0), (0.12, 2 * 16.0)])
 def test_heads_of_which_rough_ballast_would_hide_tops_do_not_stand_clear(rise_m, clear_m):
     figures = searched(filled_track(rise_m, 1500, rough_m=0.006), Way.SHARP)
     assert figures.sharp_m == pytest.approx(2 * 16.0, abs=1.0)
