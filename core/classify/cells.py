@@ -116,15 +116,15 @@ class Kept:
         pairs = number[self.pairs[chosen[self.pairs].all(axis=1)]]
         return Kept(self.lines.of(chosen), self.cell[chosen], self.paired[chosen], pairs)
 
-    def on_ground(self, tops: Tops, bed: Bed) -> Kept:
-        """Add the heights of the cells as such, and the slopes of their beds where these may be those of tracks."""
-        slope = np.where(np.isnan(self.cant(bed))[:, None], np.nan, bed.gradients(self.lines.axis))
-        return replace(self, lines=replace(self.lines, ground=Ground(tops.z.ravel()[self.cell], slope)))
+    def slopes(self, bed: Bed) -> np.ndarray:
+        """Return the slopes of the bed at the axes, (n, 2): NaN where it is steeper across than a track."""
+        slope = bed.gradients(self.lines.axis)
+        steep = np.abs(np.einsum("ij,ij->i", slope, self.lines.across)) > CANT
+        return np.where(steep[:, None], np.nan, slope)
 
-    def cant(self, bed: Bed) -> np.ndarray:
-        """Return the slopes of the bed across, (n,): those that no track has are NaN."""
-        cant = np.einsum("ij,ij->i", bed.gradients(self.lines.axis), self.lines.across)
-        return np.where(np.abs(cant) > CANT, np.nan, cant)
+    def on_ground(self, tops: Tops, slope: np.ndarray) -> Kept:
+        """Add the heights of the cells as such, and the slopes of their beds, (n, 2)."""
+        return replace(self, lines=replace(self.lines, ground=Ground(tops.z.ravel()[self.cell], slope)))
 
     def with_others(self, other: Kept, apart_m: float) -> Kept:
         """Put cells behind these that are further than `apart_m` from all of them; these state the reach of both."""
@@ -193,9 +193,10 @@ def _on_middles(lines: Lines, found: Candidates, tolerances: Tolerances, setting
 def free_standing(found: Candidates, bed: Bed, reach_m: float, tolerances: Tolerances, settings: Settings) -> Kept:
     """Keep the candidates that lie on rails and stand free of what is beside them."""
     kept = on_lines(found, reach_m, tolerances, settings)
-    cant = np.nan_to_num(kept.cant(bed))
+    slope = kept.slopes(bed)
+    cant = np.nan_to_num(np.einsum("ij,ij->i", slope, kept.lines.across))
     if tolerances.band.shadows:
-        kept = kept.on_ground(found.tops, bed)
+        kept = kept.on_ground(found.tops, slope)
     kept = kept.of(are_free(kept, found.tops, _depth_m(kept, tolerances), cant))
     kept = with_pairs(kept, settings, tolerances)
     alone = kept.of(~kept.paired)

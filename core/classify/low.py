@@ -106,8 +106,8 @@ def on_low(shown: Shown, settings: Settings) -> Standing:
     shown = replace(shown, height=above, tops=replace(shown.tops, top=rise))
     found = Candidates.of(shown, np.flatnonzero(low.crest))
     density = density_at(shown.bed.coarse, grid.middles(found.marks))
-    kept = on_lines(found, reach_at(density), tolerances, settings).on_ground(shown.tops, shown.bed)
-    kept = with_pairs(kept, settings, tolerances)
+    kept = on_lines(found, reach_at(density), tolerances, settings)
+    kept = with_pairs(kept.on_ground(shown.tops, kept.slopes(shown.bed)), settings, tolerances)
     kept = on_rails(kept, np.ones(len(kept.cell), dtype=bool), settings, tolerances)
     kept = kept.of(with_partner(kept.pairs, kept.paired))
     if len(kept.cell):

@@ -32,6 +32,14 @@ def at_grazing_angle(rng, ground):
     return xyz[seen], on[seen]
 
 
+def side_of_head(rng, count, half_m, top_m, left_m, behind_m, angle=0.0):
+    """The face of a head, 4 cm high, and what is below it and `behind_m` to the left, `half_m` from the middle."""
+    along, below = rng.uniform(-half_m, half_m, count), rng.uniform(0.0, top_m, count)
+    left = left_m + np.where(below < 0.04, 0.0, behind_m)
+    x, y = along * np.cos(angle) - left * np.sin(angle), along * np.sin(angle) + left * np.cos(angle)
+    return np.column_stack([np.column_stack([x, y]) + MIDDLE, top_m - below])
+
+
 @pytest.mark.parametrize("angle", [0.0, 0.3, np.pi / 4, 2.0])
 def test_two_rails_are_labelled(angle):
     xyz, on = ballasted(np.random.RandomState(1), angle)
@@ -310,10 +318,7 @@ def test_a_lone_bar_overhangs_if_it_is_a_rail(behind_m, kept):
     rng = np.random.RandomState(22)
     xyz, _ = with_bar(flat(10.0, rng=rng, per_m2=2000), WIDTH, 0.3)
     xyz = xyz[turned(xyz, 0.3)[1] < WIDTH / 2]
-    along, below = rng.uniform(-4.5, 4.5, 6000), rng.uniform(0.0, TOP_M, 6000)
-    left = -WIDTH / 2 + np.where(below < 0.04, 0.0, behind_m)
-    place = np.column_stack([along * np.cos(0.3) - left * np.sin(0.3), along * np.sin(0.3) + left * np.cos(0.3)])
-    face = np.column_stack([place + MIDDLE, TOP_M - below])
+    face = side_of_head(rng, 6000, 4.5, TOP_M, -WIDTH / 2, behind_m, 0.3)
     assert classify_square(np.concatenate([rough(xyz, rng), face]), SETTINGS).rail.any() == kept
 
 
@@ -326,9 +331,7 @@ def test_a_lone_bar_as_low_as_rails_in_ballast_overhangs_if_it_is_a_rail(behind_
     xyz, bar = with_bar(track, WIDTH, 0.0, 5.0, 0.125)
     shown = turned(xyz, 0.0)[1] < 5.2
     xyz, bar = rough(xyz[shown], rng, 0.005), bar[shown]
-    along, below = rng.uniform(-7.5, 7.5, 9000), rng.uniform(0.0, 0.125, 9000)
-    left = 5.0 - WIDTH / 2 + np.where(below < 0.04, 0.0, behind_m)
-    face = np.column_stack([along + MIDDLE[0], left + MIDDLE[1], 0.125 - below])
+    face = side_of_head(rng, 9000, 7.5, 0.125, 5.0 - WIDTH / 2, behind_m)
     assert classify_square(np.concatenate([xyz, face]), SETTINGS).rail[: len(xyz)][bar].any() == kept
 
 
